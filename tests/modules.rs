@@ -1,4 +1,4 @@
-//! Of every crate's tests: files that `main.rs` does not name would not be compiled.
+//! Test for the tests of every crate: a file that `main.rs` does not name would not be compiled.
 
 #[test]
 fn every_file_is_a_module() {

@@ -1,4 +1,4 @@
-//! What the filters make of faults. Prints `docs/faults.md`:
+//! Sweep of faults through the filters. Prints `docs/faults.md`:
 //!
 //! ```text
 //! scripts/faults.sh > docs/faults.md

@@ -1,4 +1,4 @@
-//! How nasty a sensor is, in numbers that need no model: what real recordings and simulated ones have to have in common.
+//! Character of a sensor, in numbers that need no model: real and simulated recordings must have them in common.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -13,14 +13,14 @@ pub struct Known {
     pub strain: Vec<f64>,
 }
 
-/// What can be said of a recording, each in percent.
+/// Character of a recording, each number in percent.
 #[derive(Clone, Copy, Debug)]
 pub struct Character {
     /// Error of the cubic fitted to the first half over the second, of the strain's range.
     pub static_cubic: f64,
     /// Mean distance of the readings on the way up and down at the same strain, of the readings' span.
     pub loop_area: f64,
-    /// How far the reading rises above where a release began, of the span: the median over long releases.
+    /// Rise of the reading above its value at the start of a release, of the span: the median over long releases.
     pub release_peak: f64,
     /// Deviation of the minutes' means of what a cubic of strain for each direction leaves, of the span.
     pub drift: f64,

@@ -1,4 +1,4 @@
-//! What a filter makes of faults: error, coverage, recovery and flags, before, during and after.
+//! Response of a filter to faults: error, coverage, recovery and flags, before, during and after.
 
 use std::fmt::Write;
 use std::io::{Seek, Write as _};
@@ -20,13 +20,13 @@ const AVERAGED_S: f64 = 2.0;
 /// Normal deviates that hold 95 %.
 const TWO_SIDED: f64 = 1.959_963_984_540_054;
 
-/// What a filter says of a row.
+/// Output of a filter for a row.
 #[derive(Clone, Copy, Debug)]
 pub struct Said {
     time_s: f64,
     strain: f64,
     strain_sd: f64,
-    /// Whether it says that something is wrong with the reading, or with the use of the sensor.
+    /// True if a flag reports that something is wrong with the reading, or with the use of the sensor.
     flagged: bool,
 }
 
@@ -85,19 +85,19 @@ impl Score {
     }
 }
 
-/// Whether a row says that something is wrong with the reading, or with the use of the sensor.
+/// True if a flag of the row reports that something is wrong with the reading, or with the use of the sensor.
 fn is_flagged(row: &Estimate) -> bool {
     Flag::ALL
         .into_iter()
         .any(|flag| row.flags.has(flag) && !matches!(flag, Flag::RampBorder | Flag::AtLimit | Flag::LongRun))
 }
 
-/// What a filter makes of a fault.
+/// Response of a filter to a fault.
 #[derive(Clone, Debug, Default)]
 pub struct Answer {
     /// Settled rows before it.
     pub before: Score,
-    /// While it lasts.
+    /// Rows during it.
     pub during: Score,
     /// The first five seconds after it.
     pub soon: Score,

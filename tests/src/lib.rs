@@ -153,7 +153,7 @@ pub fn switching_sensor() -> SwitchedModel<f64, 1, 3> {
 #[doc = include_str!("../../README.md")]
 struct Readme;
 
-/// So does the code in the description of the library.
+/// The code in the description of the library compiles and runs, too.
 #[cfg(doctest)]
 #[doc = include_str!("../../docs/library.md")]
 struct Library;

@@ -17,14 +17,14 @@ const STRAIN_MEAN: f64 = 0.15;
 const STRAIN_SD: f64 = 0.1;
 const RATE_SD: f64 = 0.08;
 const RATE_TIME_S: f64 = 1.5;
-/// Of a motion in phases.
+/// Rate of a motion in phases.
 const PHASE_RATE: f64 = 0.08;
 const PHASE_RATE_SD: f64 = 0.03;
 const HOLD_S: f64 = 4.0;
 const MOVE_S: f64 = 3.0;
 const FAR: StrainRange<f64> = StrainRange { lower: -2.0, upper: 2.0 };
 
-/// How the body moves.
+/// Motion of the body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Moves {
     /// An Ornstein-Uhlenbeck rate.
@@ -35,7 +35,7 @@ pub enum Moves {
     Phases,
 }
 
-/// Where the simulation is.
+/// State of the simulation.
 struct Body {
     strain: f64,
     rate: f64,
@@ -208,7 +208,7 @@ pub fn sensor(moves: Moves) -> SwitchedModel<f64, 2, 5> {
         .unwrap_or_else(|_| unreachable!("fixed parameters"))
 }
 
-/// How long its holds and movements last.
+/// Returns the durations of its holds and movements.
 ///
 /// # Panics
 /// Never: its parameters are fixed.
@@ -221,7 +221,7 @@ pub fn dwell(moves: Moves) -> Dwell<f64> {
 /// Nothing limits the strain.
 pub const EVIDENCE: Evidence<f64> = Evidence { limits: FAR, tempering: 1.0 };
 
-/// What a filter says of such recordings.
+/// Consistency of a filter on such recordings.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Honesty {
     rows: f64,

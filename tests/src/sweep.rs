@@ -17,11 +17,11 @@ const CALIBRATED_UNTIL_S: f64 = 200.0;
 /// A fault with its severity and how long it lasts, s.
 #[derive(Clone, Copy, Debug)]
 pub struct Case {
-    /// As the table names it.
+    /// Name in the table.
     pub name: &'static str,
-    /// What goes wrong.
+    /// Kind and size of the fault.
     pub fault: Fault,
-    /// For how long, s.
+    /// Duration, s.
     pub lasts_s: f64,
 }
 
@@ -29,7 +29,7 @@ const fn case(name: &'static str, fault: Fault, lasts_s: f64) -> Case {
     Case { name, fault, lasts_s }
 }
 
-/// Every fault, mild and severe. The sensor reads 1.6 to 3.8 kΩ.
+/// All faults, mild and severe. The sensor reads 1.6 to 3.8 kΩ.
 pub const CASES: [Case; 35] = [
     case("nothing", Fault::Dropout { share: 0.0 }, 10.0),
     case("dropout, every other reading, 20 s", Fault::Dropout { share: 0.5 }, 20.0),
@@ -93,7 +93,7 @@ pub fn of_library(sensor: &Sensor, kind: EstimatorKind) -> Run<'_> {
     Box::new(move |trace| estimates(sensor.filter().estimator(kind), trace))
 }
 
-/// What a filter makes of a fault on one or more recordings.
+/// Returns the response of a filter to a fault, over one or more recordings.
 #[must_use]
 pub fn answer_to(run: &Run, case: &Case, traces: &[Trace]) -> Answer {
     let mut sum = Answer::default();

@@ -39,7 +39,7 @@ fn another_day_is_found_where_the_sensor_moves_as_in_calibration() {
     }
 }
 
-/// On the calibration's own day readings do not leave those of the calibration.
+/// R₀ stays on the day of the calibration, whose readings stay in the calibrated range.
 #[test]
 fn nothing_is_followed_on_the_day_of_the_calibration() {
     let sensor = Sensor::from_toml(SENSOR).unwrap();

@@ -17,9 +17,9 @@ const DT_S: f64 = 0.2;
 #[derive(Clone, Copy)]
 struct Told {
     sensor: KnownPhase<SwitchedModel<f64, 1, 3>>,
-    /// What the filter's Q is multiplied with.
+    /// Factor on the filter's Q.
     process: f64,
-    /// What its R is multiplied with.
+    /// Factor on its R.
     reading: f64,
 }
 
@@ -69,7 +69,7 @@ fn nees(truth: &SVector<f64, 3>, belief: &Belief<f64, 3, 6>) -> f64 {
     error.dot(&Cholesky::new(belief.covariance.to_matrix()).unwrap().solve(&error))
 }
 
-/// What a filter that is told `assumed` says of data from the sensor as it is.
+/// Returns the statistics of a filter with the factors `assumed` on data from the unchanged sensor.
 fn statistics(assumed: Told) -> Statistics {
     let truth = told(1.0, 1.0);
     let spread = [1e-3, 1e-3, 1e-3];
@@ -101,7 +101,7 @@ fn statistics(assumed: Told) -> Statistics {
     sums
 }
 
-/// Whether a sum of χ² terms with so many degrees of freedom in all is below, inside or above 99.9 %.
+/// Compares a sum of χ² terms, with that many degrees of freedom in all, with its 99.9 % range: below, inside or above.
 fn place(sum: f64, freedom: u64) -> std::cmp::Ordering {
     let chi_squared = ChiSquared::new(freedom as f64).unwrap();
     match sum {

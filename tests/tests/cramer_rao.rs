@@ -1,4 +1,4 @@
-//! How well can it be done at all? No estimator has a smaller mean squared error than the posterior Cramér-Rao bound
+//! Comparison with the least possible error. No estimator has a smaller mean squared error than the posterior Cramér-Rao bound
 //! (Tichavský, Muravchik, Nehorai, *IEEE Trans. Signal Process.* 46 (1998) 1386). With the phase known, constant gains
 //! and no limits the sensor's state moves linearly, and the bound's recursion is exact:
 //! `J' = (Q + F J⁻¹ Fᵀ)⁻¹ + E[H Hᵀ]/R`, in the form that also takes a singular Q. The gauge curve bends, but its slope
@@ -194,7 +194,7 @@ fn a_filter_that_linearises_once_does_not() {
     }
 }
 
-/// On a straight gauge curve the bound is the Kalman filter's own variance, which a dense joint Gaussian confirms
+/// The bound on a straight gauge curve is the Kalman filter's own variance, which a dense joint Gaussian confirms
 /// elsewhere: the recursion of this test is right.
 #[test]
 fn on_a_straight_gauge_curve_the_bound_is_the_kalman_filter_s_variance() {

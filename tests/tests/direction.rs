@@ -1,4 +1,4 @@
-//! What the direction of motion leaves open: its mean and variance against simulations of the continuous law, written out
+//! Path that the direction of motion leaves open: its mean and variance against simulations of the continuous law, written out
 //! here or in `own_law`, and the coverage of intervals at any sampling rate.
 
 use ohmstrain_ekf::{Belief, Ekf, Estimator, Hypotheses, Mixture, SignSplit, State, Substeps};
@@ -89,7 +89,7 @@ fn between_known_rates_the_way_varies_as_stated() {
     assert!((variance / simulated - 1.0).abs() < 0.1, "{variance} vs {simulated}");
 }
 
-/// Without a reading for 10 and 60 s the sum of the branches spreads as it does in many simulated motions, in one step or in
+/// The sum of the branches, without a reading for 10 and 60 s, spreads as it does in many simulated motions, in one step or in
 /// many. The logistic distribution makes E|v| 2.1 % larger than the normal one does; a mean of 1200 motions is off by four
 /// standard errors at most. The deviation is stated within 20 %, of which 8 % may be chance (four standard errors).
 #[test]
@@ -216,8 +216,8 @@ fn after_a_short_pause_hypotheses_are_as_wide_as_motions_make_them() {
     }
 }
 
-/// What a body does while nothing is read is as likely one way as the other, and says nothing of what it did before: a
-/// smoother comes back to where the pause began with what was known there, but for what merging hypotheses blurs (5 %).
+/// A body's motion during a pause is as likely one way as the other, and carries no information on the motion before: a
+/// smoother returns to the beginning of the pause with the knowledge there, except for the blur of merged hypotheses (5 %).
 #[test]
 fn a_pause_forgets_the_direction_and_a_smoother_comes_back_through_it() {
     let model = sensor(Moves::Ou);

@@ -1,4 +1,4 @@
-//! What the default makes of faults: rows of `docs/faults.md`, and what must not get worse whatever the table says.
+//! Response of the default to faults: rows of `docs/faults.md`, and limits that hold whatever the table says.
 
 use ohmstrain::{EstimatorKind, Sensor};
 use ohmstrain_tests::sweep::{CASES, Case, SENSOR, answer_to, of_library, recordings, row};
@@ -51,7 +51,7 @@ fn a_filter_that_was_led_astray_looks_again() {
     }
 }
 
-/// Without doubts 85 and 69 % of the rows are wrong without a flag.
+/// A filter flags nearly all of its wrong rows. Without doubts 85 and 69 % of the rows are wrong without a flag.
 #[test]
 fn what_cannot_be_helped_is_said() {
     let (sensor, traces) = (Sensor::from_toml(SENSOR).unwrap(), recordings().unwrap());

@@ -77,7 +77,7 @@ fn a_gate_cannot_lock_the_filter_out() {
     assert!((predicted(&recovered).value - 3.0).abs() < 0.1);
 }
 
-/// What a readmission takes from the state's confidence: as much as the reading is beyond the gate, ten times at most, and three
+/// A readmission inflates the state's covariance by as much as the reading is beyond the gate, ten times at most, and three
 /// times in a row at most.
 #[test]
 fn readmission_takes_no_more_confidence_than_it_needs() {

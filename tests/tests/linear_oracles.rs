@@ -1,5 +1,5 @@
-//! On linear models, with irregular steps and missing samples, filter and smoother must say at every row what two other
-//! formulations say: the joint Gaussian of all states and readings written out densely, and the Modified
+//! Oracles on linear models, with irregular steps and missing samples: filter and smoother must agree at every row with two other
+//! formulations, the joint Gaussian of all states and readings written out densely, and the Modified
 //! Bryson-Frazier smoother, which inverts no covariance. Exactly known states make the smoother's priors singular.
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
@@ -19,7 +19,7 @@ struct Row<const N: usize> {
 }
 
 impl<const N: usize> Row<N> {
-    /// What a linear model does over `dt_s`, read off at the origin.
+    /// Reads the row of a linear model over `dt_s` off at the origin.
     fn of<const L: usize>(
         model: &(impl Dynamics<f64, N, L> + Channel<f64, N, L>),
         dt_s: f64,

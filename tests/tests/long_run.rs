@@ -1,4 +1,4 @@
-//! What time does to a filter in f32: ten million steps in a row, and a day at a thousand readings a second.
+//! Long runs of a filter in f32: ten million steps in a row, and a day at a thousand readings a second.
 
 use std::ops::Range;
 
@@ -51,14 +51,14 @@ const BURST_US: u64 = 1_000_000;
 /// A 32-bit count of microseconds starts again.
 const WRAP_US: u64 = 1 << 32;
 
-/// How far the strains of f32 and f64 may be apart. A step rounds a strain below 0.35, to 2⁻²⁶ at worst, some ten times on
+/// Largest difference between the strains of f32 and f64. A step rounds a strain below 0.35, to 2⁻²⁶ at worst, some ten times on
 /// its way through prediction and update, with either sign; and its innovation four times as the difference of sums below
 /// one, to 2⁻²⁵ at worst, of which the gain takes half, the gauge's slope being two. Thirty seconds, the memory of the
 /// baseline, hold two thousand steps of a burst and a hundred others, so that the roundings that are remembered add up to
 /// √(2100 · 14) · 2⁻²⁶ = 2.6e-6; five times that is never reached by chance.
 const APART: f64 = 1.28e-5;
 
-/// Whether the sensor is read every millisecond: in the second before and after every quarter of an hour and every wrap.
+/// True if the sensor is read every millisecond: in the second before and after every quarter of an hour and every wrap.
 fn in_burst(time_us: u64) -> bool {
     [EVERY_US, WRAP_US].into_iter().any(|period| {
         let since = time_us % period;
@@ -111,7 +111,7 @@ impl Sensor {
     }
 }
 
-/// What a day came to.
+/// Result of a day.
 struct Day {
     readings: usize,
     in_bursts: usize,

@@ -1,4 +1,4 @@
-//! What needs more than one crate. One test program; a module for each subject.
+//! Tests that need more than one crate. One test program; a module for each subject.
 
 mod adskalman_bridge;
 mod adskalman_vectors;

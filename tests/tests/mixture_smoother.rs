@@ -15,7 +15,7 @@ const N: usize = 4;
 const L: usize = 10;
 type Model = SwitchedModel<f64, 1, N>;
 const STEPS: usize = 4;
-/// Every history of four steps from one start.
+/// Number of histories of four steps from one start.
 const HISTORIES: usize = 81;
 struct Scenario {
     dt_s: [f64; STEPS],
@@ -209,7 +209,7 @@ fn the_imm_smoother_comes_nearer_than_its_filter() {
     assert!(smoother_error < 0.5 * filter_error, "{smoother_error} {filter_error}");
 }
 
-/// Where there is but one phase every smoother is the Rauch-Tung-Striebel smoother of that phase, with a dense filter.
+/// Checks that with one phase every smoother is the Rauch-Tung-Striebel smoother of that phase, with a dense filter.
 fn check_one_phase<E: Estimator<f64, N, L>>(estimator: &E, from: E::State, phase: Phase) {
     let ekf = Ekf::new(KnownPhase { model: model(&EVEN), phase });
     let mut belief = start();
@@ -276,9 +276,9 @@ fn widest_after_smoothing<E: Estimator<f64, N, L>>(
     smoothed.component_div(&filtered).max()
 }
 
-/// In a gap nothing is told of what decays, and an excess of variance, as approximate merging leaves, would grow e-fold in each
-/// time constant on the way back: 30 of them here. A smoother must not know less than its filter, but for what the means
-/// of histories are apart.
+/// A gap leaves a smoother no less certain than its filter, except for the distances between the means of histories. In a gap there
+/// is no information on what decays, and an excess of variance, as approximate merging leaves, would grow e-fold in each time
+/// constant on the way back: 30 of them here.
 #[test]
 fn a_gap_does_not_lead_a_smoother_astray() {
     let imm = Imm::<f64, 1, N>::new(model(&EVEN), 0.0, dwell(), ANYWHERE).unwrap();

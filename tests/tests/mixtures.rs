@@ -88,7 +88,7 @@ fn every_history(dwell: Dwell<f64>, start: History, steps: usize) -> Vec<History
     histories
 }
 
-/// Without readings, mixing and merging lose nothing of the first two moments: the sum over all histories is the same.
+/// Checks that without readings mixing and merging lose nothing of the first two moments: the sum over all histories is the same.
 /// No change of phase is less likely than 0.07 here, so no history is as light as 0.07⁴ = 2.4e-5, and none is dropped as
 /// negligible, which begins at e⁻¹² = 6e-6.
 fn check_prediction<E: Estimator<f64, 3, 6>>(

@@ -141,7 +141,7 @@ fn each<const N: usize, const L: usize, const K: usize>(
     state.shares().iter().zip(state.phases()).map(|(share, phase)| (share.weight, *phase, share.belief)).collect()
 }
 
-/// Whose switch in a pause is the dense filter's, to rounding.
+/// Creates a filter whose switch in a pause is the dense filter's, to rounding.
 fn signs<const B: usize, const N: usize, const K: usize>(
     model: SwitchedModel<f64, B, N>,
     dt_s: f64,
@@ -346,7 +346,7 @@ fn an_error_leaves_the_state() {
     assert!(SignSplit::<f64, 1, 3, 4>::new(model, f64::NAN, None, evidence(1.0)).is_err());
 }
 
-/// In `f32`, without Joseph's form: readings that are exact for long, and no step is refused.
+/// Filters in `f32`, without Joseph's form: readings are exact for long, and no step is refused.
 #[test]
 fn go_on_in_single_precision() {
     let model = sensor::<f32, 3, 6>();

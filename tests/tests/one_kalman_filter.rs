@@ -1,4 +1,4 @@
-//! On a linear model of one phase there is one Kalman filter: the textbook's, adskalman's, and each of our estimators,
+//! One Kalman filter on a linear model of one phase: the textbook's, adskalman's, and each of our estimators,
 //! whatever it would do elsewhere.
 //!
 //! The covariances here have condition numbers of at most some thousand and entries of order one, so that a dozen
@@ -40,7 +40,7 @@ impl<const N: usize, const L: usize> Channel<f64, N, L> for Around<N> {
     }
 }
 
-/// What a row must come to.
+/// Expected values of a row.
 struct Row<const N: usize> {
     mean: SVector<f64, N>,
     covariance: SMatrix<f64, N, N>,

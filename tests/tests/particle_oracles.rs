@@ -19,7 +19,7 @@ fn normal(rng: &mut ChaCha12Rng) -> f64 {
 type Model = SwitchedModel<f64, 2, 5>;
 type Cloud = ParticleCloud<f64, 5, 15>;
 
-/// What the oracle needs to know of the linear sensor.
+/// Parameters of the linear sensor for the oracle.
 const GAUGE: f64 = 1.5;
 const VISCOSITY_S: f64 = 0.03;
 const TAUS_S: [f64; 2] = [2.0, 15.0];

@@ -38,7 +38,7 @@ struct Process {
 }
 
 impl Process {
-    /// In its long-run distribution; `dwell_s`: mean durations of holds and of movements between them.
+    /// Starts the process in its long-run distribution; `dwell_s`: mean durations of holds and of movements between them.
     fn new(dwell_s: Option<(f64, f64)>, seed: u64) -> Self {
         let mut rng = ChaCha12Rng::seed_from_u64(seed);
         let mut draw = |sd: f64| sd * normal(&mut rng);
@@ -155,7 +155,7 @@ fn long_holds_do_not_use_the_particles_up() {
     assert!(squares < 45.3, "{squares}");
 }
 
-/// Where directions decide, a sign-split mixture of many Gaussians is close to the posterior that particles sample. A mean
+/// A sign-split mixture of many Gaussians is close to the posterior that particles sample where directions decide. A mean
 /// that is d deviations off costs d²/2 nats of the log score per row; a deviation that is wrong by a factor f costs
 /// ln² f. Both stay below 0.05 nats. The average over eight clouds takes most of the particles' own scatter out.
 #[test]

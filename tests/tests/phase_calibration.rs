@@ -20,7 +20,7 @@ const BINS: usize = 5;
 const ANYWHERE: Evidence<f64> =
     Evidence { limits: StrainRange { lower: f64::NEG_INFINITY, upper: f64::INFINITY }, tempering: 1.0 };
 
-/// How long phases of the simulated body last.
+/// Returns the durations of the simulated body's phases.
 fn true_dwell() -> Dwell<f64> {
     Dwell::new(2.0, 2.0, 0.3).unwrap()
 }

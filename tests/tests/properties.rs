@@ -1,4 +1,4 @@
-//! What every estimator keeps, whatever the recording: units are arbitrary, a missing reading is a prediction, and a step
+//! Properties of every estimator, whatever the recording: units are arbitrary, a missing reading is a prediction, and a step
 //! is as good as two halves.
 
 use nalgebra::{DMatrix, SVector};
@@ -44,7 +44,7 @@ struct Units {
 const PLAIN: Units = Units { strain: 1.0, reading: 1.0 };
 
 impl Units {
-    /// What a state is multiplied with: strain, rate, two branches, baseline.
+    /// Returns the factors on a state: strain, rate, two branches, baseline.
     fn of_state(self) -> SVector<f64, 5> {
         SVector::from([self.strain, self.strain, self.reading, self.reading, self.reading])
     }
@@ -161,7 +161,7 @@ fn mixtures(units: Units, rows: &[Row]) -> Vec<(State, [f64; 3])> {
     all
 }
 
-/// Whether two beliefs agree within a share of the standard deviations.
+/// True if two beliefs agree within a share of the standard deviations.
 fn alike<const N: usize, const L: usize>(a: &Belief<f64, N, L>, b: &Belief<f64, N, L>, tolerance: f64) -> bool {
     let sd = |i: usize| b.covariance[(i, i)].sqrt();
     (0..N).all(|i| {
@@ -214,7 +214,7 @@ proptest! {
         }
     }
 
-    /// Without readings the future has nothing to say about the past; rounding as in
+    /// The future carries no information on the past without readings; rounding as in
     /// `check_split`.
     #[test]
     fn missing_everywhere_is_prediction(rows in wild()) {
@@ -235,7 +235,7 @@ proptest! {
         }
     }
 
-    /// With the phase known and constant gains, a row without a reading in the middle of a step changes nothing, before
+    /// A row without a reading in the middle of a step changes nothing, with the phase known and constant gains, before
     /// or after smoothing.
     #[test]
     fn splitting_a_step_changes_nothing(rows in tame(), share in 0.01..0.99_f64) {

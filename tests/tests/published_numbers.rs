@@ -144,7 +144,7 @@ fn quadratic_gauge_with_the_unscented_filter() {
     assert_state(&last, &to_ours, &expected["last"], Some(&expected["cov_last"]));
 }
 
-/// As `filter`, through `kalman::Ukf`.
+/// Runs `kalman::Ukf` as `filter` runs the filter.
 fn filter_unscented(
     linear: &Value,
     record: &Value,

@@ -91,7 +91,7 @@ fn the_compact_split_integrates_its_density() {
     assert!((off - 0.0164).abs() < 5e-5, "{off}");
 }
 
-/// Without Joseph's form: 100,000 steps in `f32`, exact readings, still a covariance.
+/// The covariance stays positive semi-definite without Joseph's form: 100,000 steps in `f32`, exact readings.
 #[test]
 fn stays_a_covariance_in_single_precision() {
     let model: SwitchedModel<f32, 3, 6> = sensor();

@@ -1,4 +1,4 @@
-//! What a user stores or sends comes back as it was: feature `serde` of model and filters.
+//! Values that a user stores or sends come back as they were: feature `serde` of model and filters.
 
 use std::fmt::Debug;
 

@@ -1,4 +1,4 @@
-//! What a calibration does over and over: one pass of the EKF over a recording.
+//! Work that a calibration repeats over and over: one pass of the EKF over a recording.
 
 use ohmstrain_bench_data::simulate::{Material, Protocol, SimulationSettings, simulate};
 use ohmstrain_bench_filters::sensor;

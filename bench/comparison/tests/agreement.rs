@@ -125,7 +125,7 @@ fn all_smoothers_agree_on_the_linear_sensor() {
     }
 }
 
-/// What is timed on the sensor that is not linear takes every reading, and its strain stays where the law holds.
+/// Every timed filter of the nonlinear sensor takes every reading, and its strain stays where the law holds.
 #[test]
 fn every_filter_takes_every_reading() {
     struct Runs;

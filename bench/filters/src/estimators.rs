@@ -23,7 +23,7 @@ pub struct Gated<E: Estimator<f64, N, L>, const N: usize, const L: usize> {
 }
 
 impl<E: Estimator<f64, N, L>, const N: usize, const L: usize> Gated<E, N, L> {
-    /// From a state before any reading.
+    /// Starts from a state before any reading.
     pub fn new(estimator: E, state: E::State) -> Self {
         Self { prepared: estimator.prepare(DT_S), estimator, state, log_likelihood: 0.0 }
     }

@@ -1,4 +1,4 @@
-//! What is measured of ohmstrain: its estimators at a fixed rate, each with its state, one reading at a time; and a
+//! Filters of ohmstrain that are measured: its estimators at a fixed rate, each with its state, one reading at a time; and a
 //! hand-written filter without checks to measure them by.
 
 mod correction;

@@ -17,7 +17,7 @@ pub(crate) trait StepsInto {
     fn strain(state: &Self::State) -> f64;
 }
 
-/// What all filters do alike.
+/// Implementation that all filters share.
 macro_rules! steps_into {
     ($filter:ty, $state:ty $(, $capacity:ident)?) => {
         impl$(<const $capacity: usize>)? StepsInto for $filter {
@@ -44,12 +44,12 @@ steps_into!(Imm<f64, 3, 6>, PhaseMixture<f64, 6, 21>);
 steps_into!(SignSplit<f64, 3, 6, K>, Mixture<f64, 6, 21, K>, K);
 steps_into!(Hypotheses<f64, 3, 6, K>, Mixture<f64, 6, 21, K>, K);
 
-/// Such a filter with a gate on the normalised innovation squared and a log-likelihood. Its two states change places:
+/// Filter with a gate on the normalised innovation squared and a log-likelihood. Its two states change places:
 /// nothing is copied.
 pub(crate) struct GatedMixture<F: StepsInto> {
     filter: F,
     states: [F::State; 2],
-    /// Whether the second is the one that holds.
+    /// True if the second state is the present one.
     second: bool,
     log_likelihood: f64,
 }

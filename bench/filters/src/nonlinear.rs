@@ -7,7 +7,7 @@ use crate::{DT_S, sensor};
 #[derive(Clone, Copy, Debug)]
 pub struct NonlinearModel {
     law: SensorLaw<f64, 1>,
-    /// Of the cubic gauge.
+    /// Coefficients of the cubic gauge.
     coefficients: [f64; 3],
     reading_variance: f64,
     motion: [[f64; 2]; 2],
@@ -25,7 +25,7 @@ pub struct NonlinearModel {
     branch_noise: [f64; 2],
 }
 
-/// What is predicted, and how it follows from what was before.
+/// Prediction, and its dependence on the state before.
 #[derive(Clone, Copy, Debug)]
 pub struct Ahead {
     /// Mean of the state.
@@ -50,7 +50,7 @@ pub struct Expected {
 }
 
 impl NonlinearModel {
-    /// For steps of [`DT_S`].
+    /// Creates the model for steps of [`DT_S`].
     ///
     /// # Panics
     /// Never: the sensor's gauge is cubic.
@@ -122,7 +122,7 @@ impl NonlinearModel {
         }
     }
 
-    /// What is read there.
+    /// Returns the expected reading.
     #[inline(always)]
     #[must_use]
     pub fn expected(&self, [strain, rate, branch]: [f64; 3], rate_variance: f64) -> Expected {
@@ -157,7 +157,7 @@ struct Split {
 }
 
 impl Split {
-    /// By the density `35/32 (1 - u²)³` at `u` = three deviations.
+    /// Splits a rate with the density `35/32 (1 - u²)³` at `u` = three deviations.
     #[inline(always)]
     fn of(rate: f64, variance: f64) -> Self {
         if rate * rate >= 9.0 * variance {

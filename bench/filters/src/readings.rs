@@ -1,4 +1,4 @@
-//! What the sensor is read.
+//! Readings of the sensor.
 
 use crate::DT_S;
 use crate::sensor::{READING_SD, law};

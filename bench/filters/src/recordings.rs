@@ -1,4 +1,4 @@
-//! What is done with a whole recording at a fixed rate.
+//! Work on a whole recording at a fixed rate.
 
 use ohmstrain_ekf::{Belief, Dynamics, Ekf, Estimator, Reading};
 use ohmstrain_model::{SwitchedModel, SwitchedStep};

@@ -109,7 +109,7 @@ pub struct NonlinearReference {
 }
 
 impl NonlinearReference {
-    /// From the long-run distribution.
+    /// Starts from the long-run distribution.
     #[must_use]
     pub fn new() -> Self {
         let start = Belief::<f64, 3, 6>::initial(&sensor::<1, 3>());

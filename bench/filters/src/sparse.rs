@@ -17,7 +17,7 @@ pub type GatedUnscented<const B: usize, const N: usize, const L: usize> =
     GatedSparse<B, N, L, Compact, SigmaPoints<Cubic<f64>>>;
 
 impl<S: Switch<f64>, G: Curve<f64>, const B: usize, const N: usize, const L: usize> GatedSparse<B, N, L, S, G> {
-    /// From the long-run distribution of `model`.
+    /// Starts from the long-run distribution of `model`.
     ///
     /// # Panics
     /// If the model's law is not of the family of the filter.
@@ -27,7 +27,7 @@ impl<S: Switch<f64>, G: Curve<f64>, const B: usize, const N: usize, const L: usi
         Self { ekf, belief: Belief::initial(&model), log_likelihood: 0.0 }
     }
 
-    /// What is known after the last reading.
+    /// Belief after the last reading.
     #[must_use]
     pub const fn belief(&self) -> &Belief<f64, N, L> {
         &self.belief

@@ -18,7 +18,7 @@ use panic_halt as _;
 
 /// Resistor between the supply and the sensor, ohm; the sensor stands between GPIO2 and ground.
 const SERIES_OHM: f32 = 10_000.0;
-/// What the divider is fed with, mV. Above 2500 the converter saturates: the resistor is to be larger than a third of the sensor.
+/// Supply of the divider, mV. Above 2500 the converter saturates: the resistor is to be larger than a third of the sensor.
 const SUPPLY_MV: f32 = 3300.0;
 
 esp_bootloader_esp_idf::esp_app_desc!();

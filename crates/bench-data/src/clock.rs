@@ -13,18 +13,18 @@ pub(crate) enum Clock {
 /// A counter's last value as it stood in the file, and unwrapped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Microseconds {
-    /// As it stood in the file.
+    /// Counter as in the file.
     pub counter: u64,
-    /// Without its wraps.
+    /// Counter without its wraps.
     pub unwrapped: u64,
 }
 
 /// The last time of a stream, from which another one of the same device may go on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LastTime {
-    /// Of a column in seconds.
+    /// Time of a column in seconds.
     Seconds(f64),
-    /// Of a counter.
+    /// Time of a counter.
     Microseconds(Microseconds),
 }
 
@@ -41,7 +41,7 @@ impl Clock {
         }
     }
 
-    /// Goes on from the last time of another stream; `false` if that counted in another unit.
+    /// Continues from the last time of another stream; `false` if that counted in another unit.
     pub(crate) fn go_on(&mut self, from: LastTime) -> bool {
         match (self, from) {
             (Self::Seconds { last }, LastTime::Seconds(time_s)) => *last = Some(time_s),

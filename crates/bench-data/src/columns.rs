@@ -63,7 +63,7 @@ impl Place {
     }
 }
 
-/// Where a file keeps what.
+/// Places of a file's columns.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Columns {
     pub time: Place,

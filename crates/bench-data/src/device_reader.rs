@@ -9,7 +9,7 @@ use crate::metadata::Metadata;
 use crate::reader::{A_HEADER, called, placed};
 use crate::row::{ReadingKind, Row};
 
-/// Lines that a device may say before its header: a boot loader's are some dozen.
+/// Largest number of lines that a device may print before its header: a boot loader's are some dozen.
 const LONGEST_PREAMBLE: usize = 100;
 
 /// Reads what a device sends, row by row: goes on after lines that are none of a trace, and where the device starts again.
@@ -29,7 +29,7 @@ pub struct DeviceReader<R> {
     file: String,
     lines: Lines<R>,
     parser: LineParser,
-    /// What stood above the header and was none of a trace.
+    /// Lines above the header that were not of a trace.
     skipped: vec::IntoIter<BadContent>,
     has_rows: bool,
     /// A header has come behind rows.
@@ -42,13 +42,13 @@ pub struct DeviceReader<R> {
 pub struct DeviceRow {
     /// The row.
     pub row: Row,
-    /// Whether the device has started again, so that the row's time is on another clock than that of the row before.
+    /// True if the device has restarted, so that the row's time is on another clock than that of the row before.
     pub restarted: bool,
 }
 
 impl<R: Read> DeviceReader<R> {
-    /// Waits for a header, for a hundred other lines at most. `name` is what messages call the source, `overrides` takes the
-    /// place of what it says of itself.
+    /// Waits for a header, for a hundred other lines at most. `name` is the source's name in messages, `overrides` replaces its
+    /// metadata.
     ///
     /// # Errors
     /// [`TraceError`] if the source fails, or no header comes.
@@ -100,13 +100,13 @@ impl<R: Read> DeviceReader<R> {
         self.lines.number()
     }
 
-    /// What the readings are since the last header.
+    /// Returns the kind of the readings since the last header.
     #[must_use]
     pub fn reading_kind(&self) -> ReadingKind {
         self.parser.reading_kind().unwrap_or(ReadingKind::Ohm)
     }
 
-    /// What the source, or who overrode it, said of itself above the last header.
+    /// Returns the source's metadata above the last header, with the overrides.
     #[must_use]
     pub fn metadata(&self) -> Metadata {
         self.parser.metadata()
@@ -118,7 +118,7 @@ impl<R: Read> DeviceReader<R> {
         self.parser.last_time()
     }
 
-    /// Goes on from the last time of a stream before this one: the first row is after it, and a counter may have wrapped. `false` if
+    /// Continues from the last time of a stream before this one: the first row is after it, and a counter may have wrapped. `false` if
     /// that stream counted in another unit.
     pub fn go_on(&mut self, from: LastTime) -> bool {
         self.parser.go_on(from)

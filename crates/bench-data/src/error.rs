@@ -1,7 +1,7 @@
 use std::fmt;
 use std::io;
 
-/// Why a trace could not be read.
+/// Reason why a trace could not be read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TraceError {
@@ -15,7 +15,7 @@ pub enum TraceError {
         file: String,
         /// The line that was being read, counted from 1.
         line: u64,
-        /// What the operating system said.
+        /// Error of the operating system.
         source: io::Error,
     },
 }
@@ -32,13 +32,13 @@ pub struct BadContent {
     pub line: u64,
     /// The column, where there is one to blame.
     pub column: Option<String>,
-    /// What a trace has there.
+    /// Expected content.
     pub expected: String,
-    /// What stands there, shortened, with control characters escaped.
+    /// Content that was found, shortened, with control characters escaped.
     pub found: String,
-    /// Whether the file is written in another way altogether: no header of a trace, or no UTF-8 text.
+    /// True if the file has another format altogether: no header of a trace, or no UTF-8 text.
     pub is_foreign: bool,
-    /// Whether nothing is wrong but the time, which is not after that of the row before.
+    /// True if only the time is wrong: it is not after that of the row before.
     pub is_late: bool,
 }
 
@@ -57,9 +57,9 @@ impl fmt::Display for BadContent {
 #[error("expected {expected}, found {found}")]
 #[non_exhaustive]
 pub struct SpecError {
-    /// What is wanted.
+    /// Expected content.
     pub expected: String,
-    /// What stands there, shortened, with control characters escaped.
+    /// Content that was found, shortened, with control characters escaped.
     pub found: String,
 }
 
@@ -69,7 +69,7 @@ impl SpecError {
     }
 }
 
-/// What is wrong within a line, before file and line number are known.
+/// Error within a line, before file and line number are known.
 #[derive(Debug)]
 pub(crate) struct Fault {
     pub column: Option<&'static str>,
@@ -85,7 +85,7 @@ impl Fault {
         Self { column: None, expected, found, is_foreign: false, is_late: false }
     }
 
-    /// What is there is no trace with a fault, but something else.
+    /// Marks the content as something other than a faulty trace.
     pub(crate) fn foreign(self) -> Self {
         Self { is_foreign: true, ..self }
     }

@@ -3,7 +3,7 @@
 //! - [`TraceReader`] reads a recording row by row as it arrives, [`Trace`] holds a whole one and writes it back.
 //! - [`segment`] cuts a reference into stretching, holding and releasing.
 //! - With the feature `import`, the module of that name takes a lab's files apart and makes traces of them.
-//! - [`simulate`](mod@simulate) makes recordings of a bench that nobody has to own.
+//! - [`simulate`](mod@simulate) makes recordings of a simulated bench.
 //! - [`faults`] breaks them.
 //!
 //! # Policy

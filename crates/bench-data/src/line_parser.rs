@@ -27,24 +27,24 @@ const LONGEST_LINE: usize = 4096;
 pub struct LineParser {
     name: String,
     overrides: Metadata,
-    /// What stood there since the last header, if anything did.
+    /// Metadata since the last header, if there were any.
     before_header: Option<Metadata>,
     stream: Option<Stream>,
     number: u64,
     record: StringRecord,
 }
 
-/// What has come since a header.
+/// State since a header.
 struct Stream {
     columns: Columns,
-    /// With the overrides.
+    /// Metadata with the overrides.
     metadata: Metadata,
     parser: RowParser,
     /// The clock that late rows go on from, and how many have.
     late: Option<(RowParser, u32)>,
 }
 
-/// What a line was.
+/// Kind of a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Line {
@@ -66,14 +66,14 @@ impl LineParser {
         Self { name: name.into(), overrides, before_header: None, stream: None, number: 0, record }
     }
 
-    /// What the stream says of itself above its last header, or above the first one that is still to come, with the overrides; units
+    /// Returns the stream's metadata above its last header, or above the first one that is still to come, with the overrides; units
     /// are those of rows.
     #[must_use]
     pub fn metadata(&self) -> Metadata {
         self.stream.as_ref().map_or_else(|| self.above(), |stream| stream.metadata.clone()).in_own_units()
     }
 
-    /// What holds for a header that comes now: one that nothing stands above has the metadata of the one before.
+    /// Returns the metadata for a header that comes now: one without lines above it keeps the metadata of the one before.
     fn above(&self) -> Metadata {
         let before = self.stream.as_ref().map(|stream| &stream.metadata);
         let mut metadata = self.before_header.as_ref().or(before).cloned().unwrap_or_default();
@@ -81,19 +81,19 @@ impl LineParser {
         metadata
     }
 
-    /// What the readings are; `None` before the header.
+    /// Returns the kind of the readings; `None` before the header.
     #[must_use]
     pub fn reading_kind(&self) -> Option<ReadingKind> {
         self.stream.as_ref().map(|stream| stream.parser.reading_kind())
     }
 
-    /// Whether the readings are converter codes.
+    /// True if the readings are converter codes.
     #[must_use]
     pub fn has_codes(&self) -> bool {
         self.stream.as_ref().is_some_and(|stream| stream.parser.has_codes())
     }
 
-    /// What the reference is, if there is one.
+    /// Returns the quantity of the reference, if there is one.
     #[must_use]
     pub fn reference_quantity(&self) -> Option<ReferenceQuantity> {
         self.stream.as_ref().and_then(|stream| stream.parser.reference_quantity())
@@ -104,7 +104,7 @@ impl LineParser {
         self.stream.as_ref().and_then(|stream| stream.parser.last_time())
     }
 
-    /// Goes on from the last time of a stream before this one: the first row is after it, and a counter may have wrapped. `false` if
+    /// Continues from the last time of a stream before this one: the first row is after it, and a counter may have wrapped. `false` if
     /// that stream counted in another unit.
     pub(crate) fn go_on(&mut self, from: LastTime) -> bool {
         self.stream.as_mut().is_some_and(|stream| stream.parser.clock().go_on(from))

@@ -7,7 +7,7 @@ use crate::error::{Fault, quote};
 /// Longest line that is taken for text: a bound on memory, and far above what a trace needs.
 const LONGEST_LINE: u64 = 64 * 1024;
 
-/// Why no line could be delivered.
+/// Reason why no line could be delivered.
 pub(crate) enum LineFault {
     Io(io::Error),
     Content(Fault),
@@ -98,14 +98,14 @@ impl<R: Read> LineFeed<R> {
         self.lines.number()
     }
 
-    /// Allows one more line to be taken. A record that asks for a second one has an open quotation mark, and would
+    /// Allows one more line to be taken. A record that needs a second one has an open quotation mark, and would
     /// swallow the rest of the source.
     pub(crate) const fn begin_record(&mut self) {
         self.record_has_line = false;
     }
 
     /// Takes the next line apart at its commas, which is all that most traces need; `None` at the end of the source. A
-    /// line that needs more is left for `read`, and `false` says so; so is whatever comes after it.
+    /// line that needs more is left for `read`, and `false` is returned; so is every line after it.
     pub(crate) fn next_plain(&mut self, cells: &mut StringRecord) -> Result<Option<bool>, LineFault> {
         let Some(line) = self.lines.next()? else { return Ok(None) };
         if is_plain(line) {
@@ -129,7 +129,7 @@ impl<R: Read> LineFeed<R> {
         Ok(Some(()))
     }
 
-    /// What made `read` fail.
+    /// Takes the error that made `read` fail.
     pub(crate) const fn take_fault(&mut self) -> Option<LineFault> {
         self.fault.take()
     }
@@ -151,7 +151,7 @@ pub(crate) fn take_apart(line: &str, cells: &mut StringRecord) -> Result<(), Fau
     Ok(())
 }
 
-/// Whether a line is one record whose cells are what stands between its commas: no quotation mark, no end of line.
+/// True if a line is one record that splits at its commas: no quotation mark, no end of line.
 pub(crate) fn is_plain(line: &str) -> bool {
     !line.bytes().any(|byte| byte == b'"' || byte == b'\r')
 }

@@ -4,7 +4,7 @@ use std::str::FromStr;
 use crate::error::{Fault, SpecError, quote};
 use crate::spec::{FrontEndSpec, JointSpec};
 
-/// What a trace says about itself, one `# key = value` line each, above the header.
+/// Metadata of a trace, one `# key = value` line each, above the header.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Metadata {
     /// `material`: what the sensor is made of.
@@ -15,11 +15,11 @@ pub struct Metadata {
     pub front_end: Option<FrontEndSpec>,
     /// `joint`: the joint that the sensor spans.
     pub joint: Option<JointSpec>,
-    /// `strain_unit`: what the column `strain` is in; a fraction unless it says otherwise.
+    /// `strain_unit`: unit of the column `strain`; a fraction by default.
     pub strain_unit: Option<StrainUnit>,
-    /// `resistance_unit`: what the column `resistance_ohm` is in; Ω unless it says otherwise.
+    /// `resistance_unit`: unit of the column `resistance_ohm`; Ω by default.
     pub resistance_unit: Option<ResistanceUnit>,
-    /// Every other key and its value, in the file's order.
+    /// All other keys and their values, in the file's order.
     pub other: Vec<(String, String)>,
 }
 
@@ -42,7 +42,7 @@ pub enum ResistanceUnit {
 }
 
 impl StrainUnit {
-    /// As a file and a flag name it.
+    /// Returns its name in files and flags.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -62,7 +62,7 @@ impl StrainUnit {
 }
 
 impl ResistanceUnit {
-    /// As a file and a flag name it.
+    /// Returns its name in files and flags.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -107,7 +107,7 @@ impl Metadata {
     pub(crate) const KEYS: [&str; 6] =
         ["material", "gauge_length_mm", "front_end", "joint", "strain_unit", "resistance_unit"];
 
-    /// The units that numbers are in once they have been read: where a file names one, this says so.
+    /// Returns the metadata with the units that numbers have once they have been read, if a file names a unit.
     pub(crate) fn in_own_units(&self) -> Self {
         Self {
             strain_unit: self.strain_unit.map(|_| StrainUnit::Fraction),

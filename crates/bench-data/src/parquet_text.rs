@@ -12,7 +12,7 @@ use crate::columns::Column;
 use crate::metadata::Metadata;
 use crate::rows::append_number;
 
-/// What a Parquet file begins with.
+/// First bytes of a Parquet file.
 const MAGIC: &[u8; 4] = b"PAR1";
 /// Rows that become text at once.
 const ROWS_AT_ONCE: usize = 256;
@@ -36,13 +36,13 @@ const LONGEST_TEXT: usize = 1024;
 pub struct ParquetText {
     rows: RowIter<'static>,
     metadata: Metadata,
-    /// Whether a column of the file is read, in its order.
+    /// True for each column of the file that is read, in its order.
     is_read: Vec<bool>,
     pending: Cursor<Vec<u8>>,
 }
 
 impl ParquetText {
-    /// Whether a file that begins with these bytes is Parquet.
+    /// True if a file that begins with these bytes is Parquet.
     #[must_use]
     pub fn is_one(head: &[u8]) -> bool {
         head.starts_with(MAGIC)
@@ -51,7 +51,7 @@ impl ParquetText {
     /// Reads schema and metadata of a file.
     ///
     /// # Errors
-    /// If it is no Parquet file, or what it says about the recording makes no sense.
+    /// If it is no Parquet file, or its metadata on the recording make no sense.
     pub fn new(file: File) -> io::Result<Self> {
         let reader = SerializedFileReader::new(file).map_err(broken)?;
         let described = reader.metadata().file_metadata();
@@ -81,7 +81,7 @@ impl ParquetText {
         Ok(Self { rows, metadata, is_read, pending: Cursor::new(header) })
     }
 
-    /// What the file says about the recording, in its key-value metadata: the keys of a trace CSV.
+    /// Returns the recording's metadata from the file's key-value metadata: the keys of a trace CSV.
     #[must_use]
     pub const fn metadata(&self) -> &Metadata {
         &self.metadata
@@ -148,7 +148,7 @@ fn end_line(out: &mut [u8]) {
     }
 }
 
-/// What is said of a file that is no Parquet, or another kind of it.
+/// Returns the error for a file that is not Parquet, or another kind of it.
 pub(crate) fn broken(error: ParquetError) -> io::Error {
     io::Error::other(format!("cannot be read as Parquet: {error}"))
 }

@@ -30,7 +30,7 @@ pub struct TraceReader<R> {
     parser: RowParser,
     records: csv::Reader<LineFeed<R>>,
     record: StringRecord,
-    /// Every line up to now was plain; after the first that was not, the csv crate reads them all.
+    /// True while every line was plain; after the first that was not, the csv crate reads them all.
     plain: bool,
     done: bool,
 }
@@ -44,7 +44,7 @@ impl<R: Read> TraceReader<R> {
         Self::with_overrides(source, name, &Metadata::default())
     }
 
-    /// As [`new`](Self::new), where what `overrides` knows takes the place of what the file says.
+    /// Reads metadata and header as [`new`](Self::new) does; values of `overrides` replace the file's.
     ///
     /// # Errors
     /// [`TraceError`] if the source fails or does not start like a trace.
@@ -88,31 +88,31 @@ impl<R: Read> TraceReader<R> {
         &self.file
     }
 
-    /// What the file, or who overrode it, says about the recording.
+    /// Returns the file's metadata with the overrides.
     #[must_use]
     pub const fn metadata(&self) -> &Metadata {
         &self.metadata
     }
 
-    /// What the readings are.
+    /// Returns the kind of the readings.
     #[must_use]
     pub fn reading_kind(&self) -> ReadingKind {
         self.parser.reading_kind()
     }
 
-    /// Whether the readings are converter codes, so that each carries its own standard deviation.
+    /// True if the readings are converter codes, so that each carries its own standard deviation.
     #[must_use]
     pub fn has_codes(&self) -> bool {
         self.parser.has_codes()
     }
 
-    /// What the reference is, if there is one. A displacement becomes strain, and so does an angle with a joint.
+    /// Returns the quantity of the reference, if there is one. A displacement becomes strain, and so does an angle with a joint.
     #[must_use]
     pub fn reference_quantity(&self) -> Option<ReferenceQuantity> {
         self.parser.reference_quantity()
     }
 
-    /// Whether the file has temperatures.
+    /// True if the file has temperatures.
     #[must_use]
     pub const fn has_temperature(&self) -> bool {
         self.parser.has_temperature()
@@ -130,7 +130,7 @@ impl<R: Read> TraceReader<R> {
         self.parser.last_time()
     }
 
-    /// Goes on from the last time of a stream before this one: the first row is after it, and a counter may have wrapped. `false` if
+    /// Continues from the last time of a stream before this one: the first row is after it, and a counter may have wrapped. `false` if
     /// that stream counted in another unit.
     pub fn go_on(&mut self, from: LastTime) -> bool {
         self.parser.clock().go_on(from)
@@ -176,7 +176,7 @@ impl<R: Read> Iterator for TraceReader<R> {
 
 impl<R: Read> std::iter::FusedIterator for TraceReader<R> {}
 
-/// What messages call a source.
+/// Returns the name of a source in messages.
 pub(crate) fn called(name: &str) -> String {
     if name == "-" { "stdin" } else { name }.to_owned()
 }

@@ -1,4 +1,4 @@
-/// What the readings of a trace are.
+/// Kind of a trace's readings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ReadingKind {
     /// Resistance, Ω.
@@ -7,7 +7,7 @@ pub enum ReadingKind {
     Ratio,
 }
 
-/// What the reference of a trace is.
+/// Quantity of a trace's reference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ReferenceQuantity {
     /// Engineering strain.
@@ -19,7 +19,7 @@ pub enum ReferenceQuantity {
 /// One reading. NaN is a missing one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reading {
-    /// Ω or R/R₀, as [`reading_kind`](crate::TraceReader::reading_kind) says; NaN if missing or saturated.
+    /// Ω or R/R₀, see [`reading_kind`](crate::TraceReader::reading_kind); NaN if missing or saturated.
     pub value: f64,
     /// Standard deviation that the front end gives the reading, Ω; known for converter codes only.
     pub sd_ohm: Option<f64>,
@@ -38,7 +38,7 @@ pub struct Row {
     pub time_s: f64,
     /// The sensor.
     pub reading: Reading,
-    /// The reference, as [`reference_quantity`](crate::TraceReader::reference_quantity) says; NaN if missing.
+    /// Reference, see [`reference_quantity`](crate::TraceReader::reference_quantity); NaN if missing.
     pub reference: f64,
     /// Temperature, °C; NaN if missing.
     pub temperature_c: f64,

@@ -15,12 +15,12 @@ pub(crate) struct RowParser {
     clock: Clock,
 }
 
-/// What turns cells into readings and references.
+/// Conversion of cells to readings and references.
 struct Conversion {
     front_end: Option<FrontEnd<f64>>,
     joint: Option<Joint<f64>>,
     gauge_length_mm: f64,
-    /// What a strain and a resistance in the file are multiplied with.
+    /// Factors on a strain and a resistance in the file.
     strain_factor: f64,
     ohm_factor: f64,
 }

@@ -62,7 +62,7 @@ impl<W: Write> RowWriter<W> {
     /// Ends the row.
     ///
     /// # Errors
-    /// What `out` says.
+    /// The error of `out`.
     pub fn end(&mut self) -> io::Result<()> {
         if self.row == b"," {
             // A row of one empty cell would be a blank line, which readers pass over.
@@ -79,23 +79,23 @@ impl<W: Write> RowWriter<W> {
     /// Hands everything written so far on.
     ///
     /// # Errors
-    /// What the writer says.
+    /// The error of the writer.
     pub fn flush(&mut self) -> io::Result<()> {
         self.out.flush()
     }
 
-    /// What is written to.
+    /// Returns the writer.
     pub const fn get_mut(&mut self) -> &mut W {
         &mut self.out
     }
 
-    /// What was written to, without a flush.
+    /// Returns the writer, without a flush.
     pub fn into_inner(self) -> W {
         self.out
     }
 }
 
-/// What is smaller is all but zero, and without an exponent a line of hundreds of zeros.
+/// Smallest magnitude that is written without an exponent: a smaller number is all but zero, and would be a line of hundreds of zeros.
 const TINY: f64 = 1e-30;
 
 /// A number that is not NaN as `f64`'s `Display` has it, several times faster; one below [`TINY`] with its exponent.

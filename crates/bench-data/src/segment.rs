@@ -7,7 +7,7 @@ use crate::order::{extent, median};
 /// A stretch of rows in one phase.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Segment {
-    /// What the body does.
+    /// Phase of the body's motion.
     pub phase: Phase,
     /// The rows, end excluded.
     pub rows: Range<usize>,
@@ -62,7 +62,7 @@ pub fn segment(time_s: &[f64], strain: &[f64]) -> Vec<Segment> {
     segments
 }
 
-/// How the body moves, as far as the noise lets it be seen.
+/// Motion of the body, as far as the noise lets it be seen.
 struct Motion {
     rate: Vec<f64>,
     threshold: f64,

@@ -20,7 +20,7 @@ pub enum FrontEndSpec {
     Divider {
         /// The known resistor, Ω.
         reference_ohm: f64,
-        /// Where the sensor sits.
+        /// Position of the sensor.
         side: SensorSide,
         /// Resolution of the converter.
         bits: u32,

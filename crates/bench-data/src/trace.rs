@@ -13,29 +13,29 @@ pub const MOST_ROWS: usize = 1 << 25;
 /// The sensor's readings, one per row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Readings {
-    /// What they are.
+    /// Kind of the readings.
     pub kind: ReadingKind,
     /// The values; NaN is a missing one.
     pub values: Vec<f64>,
-    /// What is known besides if they came from a converter.
+    /// Further data of readings that came from a converter.
     pub converter: Option<ConverterReadings>,
 }
 
-/// What a converter's codes tell beyond the resistance, one entry per row.
+/// Data of a converter's codes beyond the resistance, one entry per row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ConverterReadings {
     /// The codes; `None` is a missing one.
     pub codes: Vec<Option<u32>>,
     /// Standard deviation of the reading, Ω; NaN where the reading is missing.
     pub sd_ohm: Vec<f64>,
-    /// Whether the code stood at an end of the scale; the reading is then missing.
+    /// True if the code stood at an end of the scale; the reading is then missing.
     pub saturated: Vec<bool>,
 }
 
-/// What the sensor is to be judged by, one value per row.
+/// Reference to judge the sensor by, one value per row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reference {
-    /// What the values are.
+    /// Quantity of the values.
     pub quantity: ReferenceQuantity,
     /// The values; NaN is a missing one.
     pub values: Vec<f64>,
@@ -44,7 +44,7 @@ pub struct Reference {
 /// A recording: readings over time, perhaps with a reference. All vectors have the same length.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trace {
-    /// What the recording says about itself.
+    /// Metadata of the recording.
     pub metadata: Metadata,
     /// Times on the recording's own clock, s, strictly increasing.
     pub time_s: Vec<f64>,
@@ -122,7 +122,7 @@ impl Trace {
         self.time_s.len()
     }
 
-    /// Whether there is no row.
+    /// True if there is no row.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.time_s.is_empty()
@@ -140,7 +140,7 @@ impl Trace {
         self.rows(self.time_s.partition_point(|time| *time < start_s)..self.len())
     }
 
-    /// Some of the rows; what lies beyond the last row is passed over.
+    /// Returns some of the rows; rows beyond the last one are passed over.
     #[must_use]
     pub fn rows(&self, range: Range<usize>) -> Self {
         fn cut<T: Clone>(values: &[T], range: &Range<usize>) -> Vec<T> {

@@ -12,7 +12,7 @@ impl Trace {
     /// written as its codes, displacements and angles that became strains are written as strains.
     ///
     /// # Errors
-    /// What `out` says.
+    /// The error of `out`.
     pub fn write(&self, out: &mut impl Write) -> io::Result<()> {
         write!(out, "{}", self.metadata)?;
         let mut rows = RowWriter::new(io::BufWriter::new(out));

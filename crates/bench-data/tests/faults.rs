@@ -6,7 +6,7 @@ use ohmstrain_bench_data::simulate::{Disturbances, Material, Protocol, Simulatio
 
 const FROM_S: f64 = 20.0;
 const UNTIL_S: f64 = 30.0;
-/// At 20 rows a second.
+/// Rows with the fault, at 20 rows a second.
 const ROWS: std::ops::Range<usize> = 400..600;
 
 fn trace() -> Trace {

@@ -61,7 +61,7 @@ pub fn tables(files: &[(&str, Vec<u8>)], recipe: &Recipe) -> Result<Vec<Table>, 
     files.iter().enumerate().map(read).collect()
 }
 
-/// What is proposed, run as it is proposed.
+/// Imports files as the plan proposes.
 pub fn proposed(files: &[(&str, Vec<u8>)], known: &Recipe) -> Result<(Recipe, Imported), ImportError> {
     let first = tables(files, known)?;
     let recipe = Plan::propose(&first, known)?.recipe(&first);

@@ -1,4 +1,4 @@
-//! What the reader accepts, and what it says about the rest.
+//! Inputs that the reader accepts, and its errors for others.
 
 use ohmstrain_bench_data::{FrontEndSpec, Metadata, ReadingKind, ReferenceQuantity, Trace, TraceError};
 

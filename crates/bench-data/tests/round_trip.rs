@@ -1,4 +1,4 @@
-//! What is written is read back, bit by bit.
+//! Written traces are read back, bit by bit.
 
 use ohmstrain_bench_data::{
     ConverterReadings, FrontEndSpec, JointSpec, Metadata, ReadingKind, Readings, Reference, ReferenceQuantity, Trace,

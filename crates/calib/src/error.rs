@@ -5,11 +5,11 @@ use ohmstrain_model::ParameterError;
 use ohmstrain_sensor::SensorError;
 use thiserror::Error;
 
-/// Why a calibration was not made.
+/// Reason for making no calibration.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum CalibrationError {
-    /// Nothing to calibrate on.
+    /// No recording to calibrate on.
     #[error("no recording with a known strain was given")]
     NoRecording,
     /// A recording is too short.

@@ -42,7 +42,7 @@ struct Process {
 }
 
 impl CorrectionOfFormat8 {
-    /// The same correction with its weights; `None` if nothing can be learned from the rows.
+    /// Learns the weights of the correction; `None` if nothing can be learned from the rows.
     #[must_use]
     pub fn learned(self, limits: RangeParams) -> Option<CorrectionParams> {
         let Self { corrects, readings, filter, smoother, rows, simulated } = self;

@@ -2,7 +2,7 @@ use crate::order::sorted;
 use crate::samples::central_rate;
 use crate::samples::{Samples, filled_strain};
 
-/// How the strain of the recordings moves.
+/// Statistics of the strain's motion in the recordings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct MotionStats {
     pub strain_mean: f64,
@@ -117,7 +117,7 @@ impl PhaseDurations {
         !self.holds.is_empty() && at_rest >= LEAST_REST * (at_rest + moving)
     }
 
-    /// Every hold ends one movement; the movements beyond that turned around.
+    /// Returns the probability of turning around: each hold ends one movement, and the remaining movements turned around.
     fn reversal(&self) -> f64 {
         (1.0 - self.holds.len() as f64 / self.moves.len().max(1) as f64).clamp(0.05, 0.95)
     }
@@ -163,13 +163,14 @@ mod tests {
         MotionStats::new(&[Samples::new(&time_s, &reading, &strain).unwrap()]).hold_s
     }
 
-    /// At its turns a sine is slow for 3 % of the time; that is no hold.
+    /// Tests a sine: it is slow for 3 % of the time at its turns, which is no hold.
     #[test]
     fn a_body_that_turns_around_does_not_rest() {
         assert_eq!(hold_s(|t| 0.15 * (1.0 - (std::f64::consts::TAU * t / 30.0).cos())), None);
     }
 
-    /// Up in 5 s, held for 10, down in 5, held for 10. Averages over five rows round off the corners by half their width.
+    /// Tests a strain that rises in 5 s, is held for 10, falls in 5 and is held for 10. Averages over five rows round off the corners by
+    /// half their width.
     #[test]
     fn holds_between_movements_are_rest() {
         let ramps = |t: f64| 0.3 * ((t % 30.0) / 5.0).min(1.0).min((20.0 - t % 30.0) / 5.0).max(0.0);

@@ -17,7 +17,7 @@ pub struct Samples<'a> {
     pub(crate) strain_sd: &'a [f64],
 }
 
-/// Why slices are no recording. Rows count from zero.
+/// Reason why slices are no recording. Rows count from zero.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SamplesError {

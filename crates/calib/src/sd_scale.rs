@@ -64,7 +64,7 @@ mod tests {
         assert_eq!(sd_scale(&blocks), sd_scale(&deviations(2.0)));
     }
 
-    /// Quantiles of a normal distribution twice as wide as said.
+    /// Tests quantiles of a normal distribution twice as wide as stated.
     #[test]
     fn all_levels_count() {
         let normal = statrs::distribution::Normal::standard();

@@ -162,7 +162,7 @@ fn assert_close(a: &[f64], b: &[f64], tolerance: f64) {
 
 const BASELINE_RIDGES: [f64; 7] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0];
 
-/// What Simpson's rule leaves in a feature, 4e-8, times weights of at most 1 on twenty features.
+/// Error of Simpson's rule in a feature, 4e-8, times weights of at most 1 on twenty features.
 const TOLERANCE: f64 = 1e-6;
 
 #[test]

@@ -1,4 +1,4 @@
-//! How often the intervals of a law's parameters hold the parameters that made the recording.
+//! Coverage of the intervals of a law's parameters: the share that holds the parameters of the recording.
 //!
 //! The table in `docs/parameter-coverage.md` comes from
 //! `cargo test --release -p ohmstrain-calib --test all parameter_coverage:: -- --ignored --nocapture`.
@@ -87,7 +87,7 @@ fn noiseless() -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     (time_s, ratio, strains)
 }
 
-/// How often intervals held the truth, parameter by parameter, and what estimates and errors were.
+/// Count of intervals that held the truth, parameter by parameter, with estimates and errors.
 #[derive(Default)]
 struct Tally {
     names: Vec<String>,

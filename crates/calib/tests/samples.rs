@@ -1,4 +1,4 @@
-//! What is no recording is refused, with the row that is to blame.
+//! Slices that are no recording are refused, with the row that is to blame.
 
 use ohmstrain_calib::{CalibrationError, LawOptions, Samples, SamplesError, fit_law};
 
@@ -12,7 +12,7 @@ fn recording() -> [Vec<f64>; 3] {
     [time_s, reading, strain]
 }
 
-/// What is said of the recording after a change.
+/// Returns the error for the recording after a change.
 fn refused(change: impl Fn(&mut [Vec<f64>; 3])) -> SamplesError {
     let mut columns = recording();
     change(&mut columns);

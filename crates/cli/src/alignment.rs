@@ -7,9 +7,9 @@ use crate::error::CliError;
 use crate::input::TraceFile;
 use crate::messages::Messages;
 
-/// Says how late the reference of a recording is; moves it if that is wanted, refuses one that is certainly too late to be used
-/// otherwise, and warns of one that probably is; says how late it is where that does not matter if `explain`. By how much it was
-/// moved, s.
+/// Reports the lag of a recording's reference. It moves the reference if `align`, refuses one that certainly lags too much to be used
+/// otherwise, and warns of one that probably does; with `explain` it reports a harmless lag, too. Returns the lag by which the
+/// reference was moved, s.
 pub fn check(recording: &mut TraceFile, align: bool, explain: bool, messages: &Messages) -> Result<f64, CliError> {
     let samples = recording.samples()?;
     let known = ohmstrain::Recording::new(samples.time_s(), samples.reading(), samples.strain())?;

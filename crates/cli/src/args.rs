@@ -50,7 +50,7 @@ use crate::messages::Verbosity;
     after_help = "`ohmstrain inspect FILE` says how to begin with a file of yours; `ohmstrain demo` needs none."
 )]
 pub struct Args {
-    /// What to do.
+    /// Command to run.
     #[command(subcommand)]
     pub command: Command,
     /// Say nothing on stderr but errors, and nothing at the end of a calibration
@@ -62,7 +62,7 @@ pub struct Args {
 }
 
 impl Args {
-    /// How much is to be said.
+    /// Returns the amount of messages.
     pub const fn verbosity(&self) -> Verbosity {
         match (self.quiet, self.verbose) {
             (true, _) => Verbosity::Quiet,

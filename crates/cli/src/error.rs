@@ -12,7 +12,7 @@ use thiserror::Error;
 use crate::messages::Messages;
 use crate::printable::printable;
 
-/// Why a command stopped; each kind has its exit code.
+/// Reason why a command stopped; each kind has its exit code.
 #[derive(Debug, Error)]
 pub enum CliError {
     /// The arguments contradict each other or the sensor file.
@@ -48,7 +48,7 @@ impl CliError {
         }
     }
 
-    /// Says what happened on stderr, unless it is nobody's business.
+    /// Reports the error on stderr, except that a reader has closed the pipe.
     pub fn report(&self) -> ExitCode {
         if !matches!(self, Self::ClosedPipe) {
             Messages::error(&self.to_string());
@@ -79,9 +79,9 @@ impl CliError {
     }
 }
 
-/// What the library refuses: options are arguments, rows count from one.
+/// Errors of the library as the command line reports them: options are arguments, rows count from one.
 impl CliError {
-    /// Why there is no source code of the sensor file `name`.
+    /// Converts the reason for having no source code of the sensor file `name`.
     pub fn export(error: &ExportError, name: &str) -> Self {
         match error {
             ExportError::Unsupported { .. } | ExportError::Parameter(_) => Self::Input(format!("{name}: {error}")),

@@ -73,7 +73,7 @@ impl<W: Write + Send> EstimateWriter<W> {
     }
 }
 
-/// Writes one row, `number` being asked for each column in order.
+/// Writes one row, calling `number` for each column in order.
 fn write_row<W: Write + Send>(
     rows: &mut Rows<W>,
     columns: &[Column],

@@ -23,7 +23,7 @@ pub const fn of_last_time(last: LastTime) -> StoredClock {
     }
 }
 
-/// Lets a stream go on from where the one before ended.
+/// Continues a stream from the end of the one before.
 pub fn go_on(rows: &mut Rows, stored: &Stored) -> Result<(), CliError> {
     let (last, column) = match stored.clock {
         None => return Ok(()),

@@ -18,9 +18,9 @@ const READ_AT_ONCE: usize = 1 << 16;
 
 /// A recording in memory.
 pub struct TraceFile {
-    /// What messages call it.
+    /// Name in messages.
     pub name: String,
-    /// What messages call its header: name and line.
+    /// Name of its header in messages: file and line.
     pub header: String,
     /// SHA-256 of its bytes, hexadecimal.
     pub sha256: String,
@@ -144,19 +144,19 @@ fn refuse_parameters(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
     Err(CliError::Input(format!("{} {what}", path.display())))
 }
 
-/// What messages call the header of a recording of which no row has been read yet.
+/// Returns the name, in messages, of the header of a recording of which no row has been read yet.
 pub fn header(file: &str, line: u64) -> String {
     if line == 0 { file.to_owned() } else { format!("{file}:{line}") }
 }
 
 impl TraceFile {
-    /// Some of its rows, under the same name.
+    /// Returns some of its rows, under the same name.
     pub fn rows(&self, rows: Range<usize>) -> Self {
         let (name, header, sha256) = (self.name.clone(), self.header.clone(), self.sha256.clone());
         Self { name, header, sha256, first_row: self.first_row + rows.start, trace: self.trace.rows(rows) }
     }
 
-    /// There is no row between these times.
+    /// Returns the error that no row lies between these times.
     pub fn no_rows(&self, from_s: Option<f64>, until_s: Option<f64>) -> CliError {
         let times = &self.trace.time_s;
         let (first, last) = (times.first().copied().unwrap_or(f64::NAN), times.last().copied().unwrap_or(f64::NAN));
@@ -172,7 +172,7 @@ impl TraceFile {
         ))
     }
 
-    /// As calibration wants it.
+    /// Returns it in the form that calibration takes.
     pub fn samples(&self) -> Result<Samples<'_>, CliError> {
         let Some(reference) = &self.trace.reference else {
             return Err(CliError::Input(format!(
@@ -199,7 +199,7 @@ impl TraceFile {
         value.copied().unwrap_or(f64::NAN)
     }
 
-    /// What its reference measures.
+    /// Returns the quantity of its reference.
     pub fn quantity(&self) -> Option<Quantity> {
         self.trace.reference.as_ref().map(|reference| match reference.quantity {
             ohmstrain_bench_data::ReferenceQuantity::Strain => Quantity::Strain,

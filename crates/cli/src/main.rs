@@ -46,7 +46,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Says what is wrong with the arguments, with the command's example where something is missing; or prints help.
+/// Reports the error in the arguments, with the command's example if something is missing; or prints help.
 fn refused(mut error: clap::Error) -> ExitCode {
     let mut words = std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned());
     let command = words.find(|word| !word.starts_with('-'));

@@ -1,11 +1,11 @@
-//! What is said on stderr, and how much of it.
+//! Messages on stderr, and the amount of them.
 
 use std::io::{self, Write};
 use std::sync::{Mutex, PoisonError};
 
 use crate::printable::printable;
 
-/// How much is said besides errors.
+/// Amount of messages besides errors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Verbosity {
     /// Nothing.
@@ -13,18 +13,18 @@ pub enum Verbosity {
     /// Remarks, warnings and progress.
     #[default]
     Usual,
-    /// What is being done, and since when, too.
+    /// Steps of the work with their times, too.
     Detailed,
 }
 
-/// Where a command's messages go: to stderr, or for one recording of many, its warnings into a list of its own.
+/// Destination of a command's messages: stderr, or for one recording of many, a list of its own for the warnings.
 pub struct Messages {
     verbosity: Verbosity,
     warnings: Option<Mutex<Vec<String>>>,
 }
 
 impl Messages {
-    /// To stderr.
+    /// Sends messages to stderr.
     pub const fn shown(verbosity: Verbosity) -> Self {
         Self { verbosity, warnings: None }
     }
@@ -39,37 +39,37 @@ impl Messages {
         self.warnings.map_or_else(Vec::new, |kept| kept.into_inner().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// Whether nothing is said but errors.
+    /// True if only errors are printed.
     pub fn is_quiet(&self) -> bool {
         self.verbosity == Verbosity::Quiet
     }
 
-    /// Whether there is somebody to look at progress.
+    /// True if progress is shown to a user.
     pub fn shows_progress(&self) -> bool {
         !self.is_quiet() && self.warnings.is_none()
     }
 
-    /// Says on stderr what went wrong.
+    /// Prints an error on stderr.
     pub fn error(text: &str) {
         // `eprintln!` would panic if whoever read stderr has left.
         let _ = writeln!(io::stderr(), "ohmstrain: {}", printable(text));
     }
 
-    /// Says what did not stop the command.
+    /// Prints a remark on something that did not stop the command.
     pub fn remark(&self, text: &str) {
         if self.shows_progress() {
             Self::error(text);
         }
     }
 
-    /// Says what is being done, where that is wanted.
+    /// Prints the present step of the work, if details are wanted.
     pub fn detail(&self, text: &str) {
         if self.verbosity == Verbosity::Detailed {
             self.remark(text);
         }
     }
 
-    /// Says what casts doubt on a result.
+    /// Prints, or keeps, a warning that casts doubt on a result.
     pub fn warning(&self, text: &str) {
         match &self.warnings {
             Some(_) if self.is_quiet() => {}

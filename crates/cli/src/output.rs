@@ -1,4 +1,4 @@
-//! What commands write: stdout, and files.
+//! Output of commands: stdout, and files.
 //!
 //! A command claims its files before the work, so that a name that cannot be written costs no time, makes their contents,
 //! and publishes all of them at its end. A command that fails leaves the files as they were.
@@ -42,14 +42,14 @@ pub struct Outputs {
 pub struct Claim(usize);
 
 struct Claimed {
-    /// As the user calls it.
+    /// Path as the user wrote it.
     path: PathBuf,
     kind: Kind,
     /// Columns of a table.
     columns: Vec<String>,
     place: Place,
     content: Option<Vec<u8>>,
-    /// What was written bit by bit.
+    /// File that was written bit by bit.
     begun: Option<Unfinished>,
 }
 
@@ -196,7 +196,7 @@ impl Drop for Outputs {
     }
 }
 
-/// Whether a path means stdout.
+/// True if a path means stdout.
 pub fn is_stdout(path: &Path) -> bool {
     path == Path::new("-")
 }

@@ -128,7 +128,7 @@ pub fn columns_of_ours(file: File) -> Option<Vec<String>> {
     is_ours.then(|| metadata.schema().get_fields().iter().map(name).collect())
 }
 
-/// What the writer below says; a closed pipe stays one.
+/// Returns the error of the writer below; a closed pipe stays one.
 fn failed(error: ParquetError) -> io::Error {
     match error {
         ParquetError::External(source) => match source.downcast::<io::Error>() {

@@ -33,7 +33,7 @@ fn text(recordings: &[TraceFile], doubt: &CalibrationDoubt) -> String {
     names + &doubt.text(Interface::CommandLine)
 }
 
-/// Says which rows took no part in a calibration; the first ones, or all of them.
+/// Lists the rows that took no part in a calibration; the first ones, or all of them.
 pub fn distrusted(recordings: &[TraceFile], distrusted: &[Distrusted]) -> Vec<String> {
     let line = |one: &Distrusted| {
         let recording = &recordings[one.recording];
@@ -43,7 +43,7 @@ pub fn distrusted(recordings: &[TraceFile], distrusted: &[Distrusted]) -> Vec<St
     distrusted.iter().map(line).collect()
 }
 
-/// The same on stderr, the first ones.
+/// Prints the first of them on stderr.
 pub fn warn_of_distrusted(recordings: &[TraceFile], rows: &[Distrusted], messages: &Messages) {
     let lines = distrusted(recordings, rows);
     lines.iter().take(NAMED_ROWS).for_each(|line| messages.warning(line));

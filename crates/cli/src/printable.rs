@@ -36,7 +36,7 @@ pub fn printable_json(text: &str) -> String {
     out
 }
 
-/// Whether a terminal shows a character as itself: what `str::escape_debug` leaves as it is, and quotation marks. A mark that
+/// True if a terminal shows a character as itself: all that `str::escape_debug` leaves as it is, and quotation marks. A mark that
 /// combines with the letter before it is one of them.
 fn is_shown(c: char) -> bool {
     if c.is_ascii() {

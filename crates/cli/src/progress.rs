@@ -44,7 +44,7 @@ impl<'a> Progress<'a> {
         self.bar.inc(bytes);
     }
 
-    /// Where what is said goes.
+    /// Returns the destination of messages.
     pub const fn messages(&self) -> &Messages {
         self.messages
     }
@@ -54,7 +54,7 @@ impl<'a> Progress<'a> {
         self.bar.suspend(print)
     }
 
-    /// Says what is being done, with nothing to count.
+    /// Shows the present step of the work, with nothing to count.
     pub fn doing(&self, what: &'static str) {
         self.bar.set_message(what);
         self.detail(what);

@@ -13,7 +13,7 @@ pub const WAIT_IN_MEMORY: usize = 16 << 20;
 /// The readings of a recording that may be longer than memory, and nothing else of it: what exceeds 16 MB waits in a temporary
 /// file, and rows are taken out of it by the thousand.
 pub struct StoredReadings {
-    /// Of a row: time, value and, for those of a converter, deviation and a byte that says whether it was saturated.
+    /// True if a row has, besides time and value, the deviation of a converter's reading and a byte for saturation.
     has_codes: bool,
     len: usize,
     kept: RefCell<Kept>,
@@ -25,7 +25,7 @@ struct Kept {
     first: usize,
     rows: Vec<(f64, Reading)>,
     bytes: Vec<u8>,
-    /// Why rows cannot be taken out again.
+    /// Error that keeps rows from being taken out again.
     failed: Option<io::Error>,
 }
 
@@ -69,7 +69,7 @@ impl StoredReadings {
         (0..self.len).map(|row| self.row(row).1.value)
     }
 
-    /// Time, s, and reading of a row; NaN if it cannot be taken out, which [`Self::whole`] then says.
+    /// Returns time, s, and reading of a row; NaN if it cannot be taken out, which [`Self::whole`] then reports.
     pub fn row(&self, row: usize) -> (f64, Reading) {
         let mut kept = self.kept.borrow_mut();
         if kept.failed.is_none() && (kept.rows.is_empty() || row / AT_ONCE != kept.first / AT_ONCE) {
@@ -80,7 +80,7 @@ impl StoredReadings {
         known.unwrap_or((f64::NAN, Reading { value: f64::NAN, sd: 0.0, saturated: false }))
     }
 
-    /// Whether all rows that were asked for could be taken out.
+    /// Fails unless all requested rows could be taken out.
     pub fn whole(&self) -> Result<(), CliError> {
         self.kept.borrow().failed.as_ref().map_or(Ok(()), |error| Err(temporary(error)))
     }
@@ -137,8 +137,8 @@ mod tests {
 
     use super::*;
 
-    /// Rows in the order in which a smoother asks: forward, then segment by segment backwards. As many as exceed what waits
-    /// in memory, and few.
+    /// Tests rows in a smoother's order: forward, then segment by segment backwards. Their number exceeds the memory for waiting
+    /// ones, or is small.
     #[test]
     fn rows_come_out_as_they_went_in() {
         for rows in [10, WAIT_IN_MEMORY / (2 * NUMBER) + 5000] {

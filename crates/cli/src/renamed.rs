@@ -1,4 +1,4 @@
-//! What has taken the place of flags that are gone, for those who still type them.
+//! Replacements of flags that are gone, for users who still type them.
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
@@ -7,7 +7,7 @@ const ESTIMATE: [&str; 3] = ["filter", "smooth", "live"];
 /// Commands that read recordings and no stream.
 const RECORDINGS: [&str; 5] = ["calibrate", "refine", "fit-law", "smooth", "evaluate"];
 
-/// What does now what an unknown flag of this command once did.
+/// Returns the replacement for an unknown flag that this command once had.
 pub fn answer(error: &clap::Error, command: &str) -> Option<String> {
     let ErrorKind::UnknownArgument = error.kind() else { return None };
     let Some(ContextValue::String(flag)) = error.get(ContextKind::InvalidArg) else { return None };

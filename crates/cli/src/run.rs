@@ -10,7 +10,7 @@ pub fn builder<'a>(sensor: &'a Sensor, args: &'a EstimateArgs) -> FilterBuilder<
     args.initial_strain.map_or(builder, |strain| builder.initial_strain(strain))
 }
 
-/// The same for a device that has started again: what is known of its first row and of its first clock is not known of these.
+/// Returns the builder for a device that has restarted: the known first row and strains on the first clock do not apply to it.
 pub fn builder_anew<'a>(sensor: &'a Sensor, args: &'a EstimateArgs) -> FilterBuilder<'a> {
     let mut builder = sensor.filter();
     if let Some(kind) = args.estimator.chosen() {
@@ -37,7 +37,7 @@ pub fn builder_anew<'a>(sensor: &'a Sensor, args: &'a EstimateArgs) -> FilterBui
     builder
 }
 
-/// What the rested sensor reads in a recording whose first readings are `first`; `None` if nobody says, so that R₀ follows.
+/// Returns the reading of the rested sensor for a recording whose first readings are `first`; `None` if it was not given, so that R₀ follows.
 pub fn rest_resistance(
     wanted: Option<RestResistance>,
     sensor: &Sensor,

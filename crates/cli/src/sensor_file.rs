@@ -5,7 +5,7 @@ use ohmstrain::{EstimatorKind, Sensor, SensorParams};
 use crate::error::CliError;
 use crate::whole_file;
 
-/// What a file is in which joints are described.
+/// Description of a file that describes joints, for messages.
 pub const A_HAND: &str = "is the description of a hand, not of a sensor: give it to `ohmstrain hand`";
 
 /// Reads a sensor and checks that the estimator (or the file's choice) can be made of it.
@@ -27,17 +27,17 @@ pub fn read(path: &Path, estimator: Option<EstimatorKind>) -> Result<Sensor, Cli
     sensor.map_err(|error| CliError::Input(error.in_file(&name)))
 }
 
-/// Whether these are the first bytes of a sensor's parameters, or of a hand's description.
+/// True if these are the first bytes of a sensor's parameters, or of a hand's description.
 pub fn is_one(bytes: &[u8]) -> bool {
     bytes.starts_with(b"format = ")
 }
 
-/// Whether this is the description of a hand.
+/// True if this is the description of a hand.
 pub fn is_hand(text: &str) -> bool {
     is_one(text.as_bytes()) && text.lines().any(|line| line.trim() == "[[joints]]")
 }
 
-/// Whether this is a recording: its first line that is no comment has names of columns.
+/// True if this is a recording: its first line that is no comment has names of columns.
 pub fn is_recording(text: &str) -> bool {
     let first = text.lines().find(|line| !line.trim().is_empty() && !line.starts_with('#')).unwrap_or("");
     first.contains(',') && first.split(',').any(|cell| matches!(cell.trim(), "time_s" | "time_us"))

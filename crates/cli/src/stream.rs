@@ -1,4 +1,4 @@
-//! Rows as they come: of a recording, or with `--skip-bad` of a device that says other things, too, and may start again.
+//! Rows as they come: of a recording, or with `--skip-bad` of a device that prints other lines, too, and may restart.
 
 use std::io::Read;
 
@@ -80,7 +80,7 @@ impl Rows {
         }
     }
 
-    /// Goes on from the last time of the stream before; `false` if that counted in another unit.
+    /// Continues from the last time of the stream before; `false` if that counted in another unit.
     pub fn go_on(&mut self, from: LastTime) -> bool {
         match self {
             Self::Recording(rows) => rows.go_on(from),
@@ -88,7 +88,7 @@ impl Rows {
         }
     }
 
-    /// What the readings are.
+    /// Returns the kind of the readings.
     pub fn reading_kind(&self) -> ReadingKind {
         match self {
             Self::Recording(rows) => rows.reading_kind(),
@@ -96,7 +96,7 @@ impl Rows {
         }
     }
 
-    /// What the source says of itself.
+    /// Returns the metadata of the source.
     pub fn metadata(&self) -> Metadata {
         match self {
             Self::Recording(rows) => rows.metadata().clone(),

@@ -9,7 +9,7 @@ use crate::messages::Messages;
 
 /// Readings at the start of a file that are looked at before it is filtered.
 pub const FIRST_READINGS: usize = 100;
-/// The same where somebody waits for each row.
+/// Number of first readings if a reader waits for each row.
 pub const FIRST_LIVE_READINGS: usize = 20;
 
 /// Refuses readings in another unit than the sensor's; `header` is what messages call the recording's header.

@@ -10,7 +10,7 @@ const ARGUMENTS: i32 = 2;
 /// Exit code for the rest: files that cannot be read or written.
 const OTHER: i32 = 1;
 
-/// What was there before: a sensor file that may be replaced.
+/// Content of the output before: a sensor file that may be replaced.
 const OLD: &str = "format = 9\nmade_by = \"ohmstrain 0.0.1\"\nquantity = \"strain\"\n";
 
 /// The commands that read a recording, each with a file that it would write.
@@ -299,7 +299,7 @@ fn a_sensor_file_that_is_none_is_refused_alike_by_every_command() {
     }
 }
 
-/// As `fails`, where the operating system has the last word of the message.
+/// Checks like `fails`, for messages that end with words of the operating system.
 #[track_caller]
 fn fails_on_files(bench: &Bench, arguments: &[&str], message: &str) {
     let before = bench.files();

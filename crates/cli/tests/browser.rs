@@ -121,7 +121,7 @@ fn the_report_is_complete_without_scripts() {
     }
 }
 
-/// On paper the figures share pages, and what is folded is left out.
+/// The printed report's figures share pages, and folded parts are left out.
 #[test]
 fn the_report_prints_on_few_pages() {
     let Some(browser) = browser() else { return };
@@ -147,7 +147,7 @@ const LOOKED_AT: [&str; 9] = [
 ];
 /// Cells of a fingerprint across and down.
 const CELLS: (usize, usize) = (24, 12);
-/// How far a cell's mean brightness, 0 to 255, may be from the one that was looked at: other fonts move letters within a
+/// Largest difference of a cell's mean brightness, 0 to 255, from the approved one: other fonts move letters within a
 /// cell, another compiler or processor a line by less than a pixel. A line that is missing, or an axis that is another one,
 /// changes dozens of cells by more; a picture that is another one most of them.
 const CELL_TOLERANCE: f64 = 12.0;

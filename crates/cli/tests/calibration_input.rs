@@ -1,4 +1,4 @@
-//! What `calibrate` makes of recordings that are partly, or wholly, wrong.
+//! Recordings that are partly, or wholly, wrong, in `calibrate`.
 
 use crate::common::{Bench, Run, SIMULATE, change_rows};
 

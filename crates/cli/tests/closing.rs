@@ -1,9 +1,9 @@
-//! What `calibrate` says at its end.
+//! Summary at the end of `calibrate`.
 
 use crate::common::{Bench, CALIBRATED_UNTIL, Csv, SIMULATE, change_rows};
 use serde_json::Value;
 
-/// At most ten lines, none wider than a terminal, with every heading.
+/// The summary has at most ten lines, none wider than a terminal, with every heading.
 #[test]
 fn a_calibration_ends_in_ten_lines() {
     let bench = Bench::new();
@@ -114,7 +114,7 @@ fn the_verdict_is_of_the_worst_that_is_known() {
     }
 }
 
-/// Without rows that were kept from it there is nothing to test on, and what is left out is all.
+/// A calibration on all rows has nothing to test on, and only held-out scores are printed.
 #[test]
 fn a_calibration_on_all_rows_is_tested_on_none() {
     let bench = Bench::calibrated();

@@ -1,4 +1,4 @@
-//! What `filter` and `smooth` print: columns, units, flags, and what the flags of the command line change.
+//! Output of `filter` and `smooth`: columns, units, flags, and the effects of the flags of the command line.
 
 use crate::common::{Bench, Csv, ESTIMATES_HEADER, SIMULATE, change_rows};
 use serde_json::Value;
@@ -222,7 +222,7 @@ fn a_known_initial_strain_starts_there() {
     assert!((Csv::new(&far).numbers("strain")[0] - 0.2).abs() < 2e-3);
 }
 
-/// Where the filter errs most it is told the truth: that row and the second after it are better, also with a lag, where the
+/// A strain that is known where the filter errs most improves that row and the second after it, also with a lag, where the
 /// rows before it profit too; and rows before it, without a lag, are as they were.
 #[test]
 fn a_strain_that_is_known_is_taken_in() {

@@ -60,7 +60,7 @@ fn a_split_is_a_calibration_on_the_first_rows_and_scores_of_the_rest() {
     assert!(by_hand[0]["calibration_s"].is_null() && by_hand[0].get("lag_s").is_none());
 }
 
-/// With strains that the reference tells: the same as it is, and two more, of which the smoother's is the better.
+/// Known strains of the reference add two scores, with a smaller error of the smoother; the score without them stays.
 #[test]
 fn known_strains_are_scored_beside() {
     let bench = simulated(&["1"]);

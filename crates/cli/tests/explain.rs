@@ -1,4 +1,4 @@
-//! What `calibrate --explain` and `--bootstrap` print.
+//! Output of `calibrate --explain` and `--bootstrap`.
 
 use crate::common::{Bench, SIMULATE};
 

@@ -1,4 +1,4 @@
-//! What `export` writes, and that the C it writes computes what the program computes.
+//! Output of `export`, and tests that the C it writes computes the same as the program.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -26,7 +26,7 @@ pub fn compilers() -> Vec<&'static str> {
     found
 }
 
-/// As the README has it: strictly.
+/// Flags of the README: strict ones.
 const STRICT: [&str; 8] = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Isrc"];
 
 /// Compiles sources strictly into a program, or into an object file if its name ends so; where it is.
@@ -54,7 +54,7 @@ pub fn compile_and_run(compiler: &str, folder: &Path, sources: &[&str], stdin: &
     run_program(&compile(compiler, folder, sources, "program.out"), stdin, &[])
 }
 
-/// As an AVR has them: the self-test's bits, and those of a recording that is unplugged for a while.
+/// The lists for an AVR give the self-test's bits, and those of a recording that is unplugged for a while.
 #[test]
 fn lists_of_operations_compute_what_compiled_functions_do() {
     let bench = every_filter();
@@ -78,7 +78,7 @@ fn lists_of_operations_compute_what_compiled_functions_do() {
     }
 }
 
-/// Without `--dt-s` readings come as often as in calibration.
+/// Readings come as often as in calibration unless `--dt-s` is given.
 #[test]
 fn the_usual_time_between_readings_is_the_calibrations() {
     let bench = Bench::calibrated();
@@ -295,7 +295,7 @@ fn two_sensors_with_prefixes_live_in_one_program() {
     }
 }
 
-/// Who promised what stands in the header, and the compiler's flags that would break it are refused.
+/// The header names the author of the promise, and the compiler's flags that would break it are refused.
 #[test]
 fn a_promise_is_of_the_default() {
     let bench = every_filter();

@@ -21,7 +21,7 @@ const INSTRUCTIONS: usize = 4;
 const FLASH: usize = 5;
 const RAM: usize = 6;
 
-/// To the bit: a quadratic function and fewer rows are added up in the same order in both languages.
+/// A smaller filter equals its twin to the bit: a quadratic function and fewer rows are added up in the same order in both languages.
 #[test]
 fn a_smaller_filter_fits_and_is_its_twin() {
     let bench = every_filter();

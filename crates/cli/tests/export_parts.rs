@@ -9,7 +9,7 @@ use toml::{Table, Value};
 use crate::common::Bench;
 use crate::export::{compile, compilers, run_program};
 
-/// What a part is called, and the forms that it has.
+/// Name of a part, and its forms.
 type Part = (&'static str, &'static [&'static str]);
 
 const PARTS: [Part; 12] = [
@@ -232,7 +232,7 @@ impl Variant {
         }
     }
 
-    /// Where it rested, and whether at zero.
+    /// Checks the words on where the sensor rested, and on zero.
     fn check_words(&self, bench: &Bench) {
         let (readme, header) = (bench.read("c/README.md"), bench.read("c/src/ohmstrain.h"));
         let never = self.is("rest", "never");

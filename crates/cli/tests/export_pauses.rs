@@ -43,7 +43,7 @@ fn since_the_pause(printed: &str, before: usize) -> Vec<(f64, f64)> {
     table.numbers("strain").into_iter().zip(table.numbers("strain_sd")).skip(1 + before).collect()
 }
 
-/// From none to more than single precision has squares of, before any reading and after some: a pause, and one that ends with a reading.
+/// Pauses before any reading and after some, some of them ended by a reading: from none to lengths whose squares exceed single precision.
 const ANY: &str = r#"
 #include "ohmstrain.h"
 #include <math.h>

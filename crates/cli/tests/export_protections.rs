@@ -3,7 +3,7 @@
 use crate::common::{Bench, Csv, change_rows};
 use crate::export::{compile_and_run, compilers};
 
-/// What turns a protection off in C, and in the program.
+/// Switches that turn a protection off in C, and in the program.
 const SWITCHES: [(&str, &[&str]); 5] = [
     ("-DOHMSTRAIN_WITHOUT_PLAUSIBILITY", &["--without", "plausibility"]),
     ("-DOHMSTRAIN_WITHOUT_INFLUENCE", &["--influence", "none"]),
@@ -12,7 +12,7 @@ const SWITCHES: [(&str, &[&str]); 5] = [
     ("-DOHMSTRAIN_WITHOUT_DOUBTS", &["--without", "doubts"]),
 ];
 
-/// What needs each of them: an unplugging, spikes, a bad contact, a number that is stuck, another day.
+/// Returns a reading with a fault for each of them: an unplugging, spikes, a bad contact, a number that is stuck, another day.
 fn faulty(row: usize, ohm: f64) -> f64 {
     match row {
         800..840 => 210_000.0,

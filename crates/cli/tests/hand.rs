@@ -5,7 +5,7 @@ use crate::common::{Bench, Csv, Run, change_rows};
 const FINGERS: [&str; 5] = ["thumb", "index", "middle", "ring", "little"];
 /// A third of its length is what the simulated sensor is stretched by; that is 90° over 6.4 mm on 30 mm.
 const JOINT: &str = "prestrain=0 moment_arm_mm=6.4 gauge_length_mm=30";
-/// Of `JOINT`: degrees per strain.
+/// Scale of `JOINT`, degrees per strain.
 const DEGREES: f64 = 180.0 / std::f64::consts::PI * 30.0 / 6.4;
 
 /// A folder with a sensor and a recording per finger, `hand.toml`, and `hand.csv` with all readings.

@@ -38,7 +38,7 @@ fn an_overload_is_a_missing_reading() {
     }
 }
 
-/// What a gate turns down for two seconds ends no run, and half a minute later the estimate is what it would have been.
+/// Readings that a gate rejects for two seconds end no run, and half a minute later the estimate is what it would have been.
 #[test]
 fn an_unplugged_sensor_is_found_again() {
     let bench = Bench::calibrated();

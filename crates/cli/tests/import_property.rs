@@ -11,7 +11,7 @@ use proptest::sample::select;
 /// A unit by the spelling in the file, and by how many powers of ten its numbers are larger than the trace's.
 type Unit = (&'static str, i32);
 
-/// How a file is written.
+/// Form of a file.
 #[derive(Clone, Debug)]
 struct Form {
     separator: char,
@@ -21,7 +21,7 @@ struct Form {
     brackets: (&'static str, &'static str),
     names: [&'static str; 3],
     units: [Unit; 3],
-    /// Where time, reading and reference stand among the columns.
+    /// Places of time, reading and reference among the columns.
     order: [usize; 3],
     extra: bool,
     overload: &'static str,

@@ -1,4 +1,4 @@
-//! What a command that is stopped leaves behind.
+//! Files that a stopped command leaves behind.
 #![cfg(unix)]
 
 use std::io::{BufRead, BufReader, Write};
@@ -64,7 +64,7 @@ fn a_signal_leaves_the_old_file_and_no_other() {
     }
 }
 
-/// What nobody can clear away the next run does; what somebody is still at it leaves.
+/// The next run clears away the files of a killed one; files of a process that still runs stay.
 #[test]
 fn what_a_killed_run_left_goes_with_the_next_one() {
     let bench = bench();

@@ -159,7 +159,7 @@ fn a_file_that_is_no_trace_is_sent_to_inspect() {
     assert!(run.code == Some(4) && !run.stderr.contains("inspect"), "{}", run.stderr);
 }
 
-/// What was taken for what is said once for each column, with every word that was taken for none.
+/// The remarks name each column's role once, with every word that was taken for a missing value.
 #[test]
 fn remarks_name_every_missing_word_and_come_once() {
     let bench = Bench::new();

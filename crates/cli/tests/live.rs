@@ -121,7 +121,7 @@ impl Port {
     }
 }
 
-/// What stands on the terminal for a row of `filter`.
+/// Returns the terminal's line for a row of `filter`.
 fn shown(estimates: &Csv, row: usize) -> String {
     let number = |column: &str| estimates.numbers(column)[row];
     // 1.96 standard deviations, in percent, as the terminal's two digits have them.

@@ -1,4 +1,4 @@
-//! How the program speaks: help, hints, how much it says, and what shells and manuals get.
+//! Manners of the program: help, hints, the amount of messages, completions and manuals.
 
 use crate::common::{Bench, SIMULATE, files_in};
 

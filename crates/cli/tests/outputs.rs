@@ -63,7 +63,7 @@ fn a_file_of_another_kind_is_replaced_only_by_force() {
     assert!(bench.read("README.md").starts_with("# One soft strain sensor"));
 }
 
-/// What `live` recorded is nowhere else; a simulation is, and so is what was imported.
+/// Only outputs that can be made again are replaced: a recording of `live` cannot; a simulation can, and so can an import.
 #[test]
 fn only_what_can_be_made_again_is_replaced() {
     let bench = Bench::new();
@@ -193,7 +193,7 @@ mod on_unix {
         refused(&bench, &[&CALIBRATE[..], &["full", "--report", "new.html"]].concat(), OTHER, "cannot write full: ");
     }
 
-    /// There or not yet there, what the link points to is written.
+    /// A symbolic link stays, and its target is written, whether it exists or not.
     #[test]
     fn a_symbolic_link_stays() {
         let bench = Bench::calibrated();

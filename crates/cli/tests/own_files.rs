@@ -1,4 +1,4 @@
-//! What the program takes for its own, and replaces: whole headers and marks, not what looks a little like them.
+//! Files that the program takes for its own, and replaces: by whole headers and marks, not by a slight likeness.
 
 use std::fs;
 

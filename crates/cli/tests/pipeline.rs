@@ -1,4 +1,4 @@
-//! From a recording to a report: what the program promises when nothing is wrong.
+//! Pipeline from a recording to a report: the program's promises when nothing is wrong.
 
 use std::fs;
 

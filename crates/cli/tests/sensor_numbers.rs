@@ -5,7 +5,7 @@ use toml::Value;
 
 use crate::common::{Bench, Csv};
 
-/// What a number is changed to.
+/// Values that a number is changed to.
 const HOSTILE: [f64; 9] = [f64::NAN, f64::INFINITY, -1.0, 0.0, 1e300, -1e300, 1e9, -1e9, 1e-12];
 
 /// Paths of all numbers that are no counts. Of what is only told, and of the rows that a correction
@@ -37,7 +37,7 @@ fn at<'a>(value: &'a mut Value, path: &str) -> &'a mut Value {
     })
 }
 
-/// Which numbers of estimates are missing; all others are finite.
+/// Returns true for the numbers of estimates that are missing; all others are finite.
 #[track_caller]
 fn missing(rows: &[Estimate]) -> Vec<bool> {
     let is_missing = |number: Option<f64>| {

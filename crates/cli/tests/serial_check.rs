@@ -1,4 +1,4 @@
-//! Whether a board agrees with this computer: the exported sketch, compiled for this computer with an Arduino that is none.
+//! Agreement of a board with this computer: the exported sketch, compiled for this computer with a stand-in for Arduino.
 
 use std::process::Command;
 
@@ -7,14 +7,14 @@ use crate::export::{DT_S, compilers};
 
 const PLOTTER: &str = "c/examples/ohmstrain_plotter/ohmstrain_plotter.ino";
 
-/// What the sketch of a calibrated sensor prints, once it has been changed.
+/// Returns the output of a calibrated sensor's sketch, after a change of the sketch.
 fn printed(bench: &Bench, change: impl Fn(&str) -> String) -> Option<String> {
     bench.run(&["export", "--sensor", "sensor.toml", "--dt-s", DT_S, "--target", "c", "-o", "c", "--force"]).ok();
     bench.write(PLOTTER, change(&bench.read(PLOTTER)));
     printed_by(bench, PLOTTER)
 }
 
-/// What a sketch of the exported folder prints on a computer.
+/// Returns the output of an exported sketch on a computer.
 fn printed_by(bench: &Bench, sketch: &str) -> Option<String> {
     let arduino = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scripts/exported-c");
     let compiler = compilers().first().map(|c| if *c == "gcc" { "g++" } else { "clang++" })?;
@@ -109,7 +109,7 @@ fn lines_that_are_lost_or_missing_are_said() {
     }
 }
 
-/// What the recorder prints is a trace of converter codes, which every command reads, and `import` too.
+/// The recorder prints a trace of converter codes, which every command reads, and `import` too.
 #[test]
 fn what_the_recorder_prints_is_a_trace() {
     let bench = Bench::calibrated();

@@ -366,7 +366,7 @@ fn a_clock_that_starts_again_goes_on() {
     assert_eq!(run.ok(), alone(&first));
 }
 
-/// It is said while the stream goes on.
+/// The restart of a clock is reported while the stream goes on.
 #[test]
 fn a_clock_that_starts_again_is_said_at_once() {
     let bench = Bench::calibrated();
@@ -386,7 +386,7 @@ fn a_clock_that_starts_again_is_said_at_once() {
     assert!(child.wait().unwrap().success());
 }
 
-/// What is known of the first clock is not known of the second.
+/// A known strain on the first clock is not one on the second.
 #[test]
 fn a_second_clock_has_no_known_strains() {
     let bench = Bench::calibrated();

@@ -77,7 +77,7 @@ fn a_rest_resistance_of_no_such_sensor_is_refused() {
     assert_eq!(near.code, Some(0), "{}", near.stderr);
 }
 
-/// With the readings' unit said, the estimates are those of the recording in ohms.
+/// The estimates are those of the recording in ohms once the readings' unit is given.
 #[test]
 fn the_answer_is_the_unit() {
     let bench = Bench::calibrated();

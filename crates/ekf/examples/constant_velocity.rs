@@ -7,7 +7,7 @@ use ohmstrain_ekf::kalman::{Filter, Kalman, KalmanError, Normal};
 pub const POSITIONS: [f64; 12] =
     [0.02, 0.05, f64::NAN, 0.13, 0.11, 0.16, f64::NAN, f64::NAN, f64::NAN, 0.29, 0.26, 0.36];
 
-/// What is printed.
+/// Returns the printed numbers.
 pub fn run() -> Result<[f64; 2], KalmanError> {
     let (dt, q) = (0.1_f64, 1e-3);
     let filter = Kalman::new(

@@ -15,7 +15,7 @@ pub fn filter(from_s: f64, to_s: f64) -> Kalman<f64, 2, 1> {
     Kalman::new(matrix![1.0, dt; 0.0, 1.0], noise, matrix![1.0, 0.0], matrix![error.powi(2)])
 }
 
-/// What is printed.
+/// Returns the printed numbers.
 pub fn run() -> Result<[f64; 2], KalmanError> {
     let start = Normal::independent(vector![0.0, 0.0], &vector![1.0, 10.0])?;
     let mut rewind = Rewind::<_, _, 2, 1, 8>::new(filter, 0.0, start);

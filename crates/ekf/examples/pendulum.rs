@@ -11,7 +11,7 @@ pub fn swing(x: &Vector2<f64>) -> Vector2<f64> {
     vector![x[0] + rate * DT, rate]
 }
 
-/// What is printed.
+/// Returns the printed numbers.
 pub fn run() -> Result<[f64; 3], KalmanError> {
     let jacobian = |x: &Vector2<f64>| matrix![1.0 - 9.81 * x[0].cos() * DT * DT, DT; -9.81 * x[0].cos() * DT, 1.0];
     let (deflection, gradient) = (|x: &Vector2<f64>| vector![x[0].sin()], |x: &Vector2<f64>| matrix![x[0].cos(), 0.0]);

@@ -10,7 +10,7 @@ pub fn reading(k: i32) -> [Option<f64>; 2] {
     [Some(temperature + 0.5 * coarse), (k % 10 == 0).then_some(temperature + 0.05 * fine)]
 }
 
-/// What is printed.
+/// Returns the printed numbers.
 pub fn run() -> Result<[f64; 2], KalmanError> {
     let filter = Kalman::new(
         matrix![1.0, 1.0; 0.0, 1.0],

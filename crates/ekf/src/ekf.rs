@@ -15,7 +15,7 @@ pub struct Ekf<M> {
     model: M,
 }
 
-/// Everything one step computed.
+/// Results of one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step<T, const N: usize, const L: usize> {
     /// The transition from the old belief, as a smoother needs it.
@@ -24,11 +24,11 @@ pub struct Step<T, const N: usize, const L: usize> {
     pub prior: Belief<T, N, L>,
     /// The belief after it; the prior if the reading was missing.
     pub posterior: Belief<T, N, L>,
-    /// What the reading did; `None` if it was missing.
+    /// Effect of the reading; `None` if it was missing.
     pub update: Option<Update<T, N>>,
 }
 
-/// What a reading did to a belief.
+/// Effect of a reading on a belief.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Update<T, const N: usize> {
     /// The expected reading, its gradient H and noise variance R (the reading's own included).
@@ -56,7 +56,7 @@ impl<M> Ekf<M> {
         &self.model
     }
 
-    /// Predicts `dt_s ≥ 0` seconds ahead, in as many steps as the model asks for, then takes the reading.
+    /// Predicts `dt_s ≥ 0` seconds ahead, in as many steps as the model needs, then takes the reading.
     ///
     /// # Errors
     /// See [`StepError`]; the belief passed in is untouched.
@@ -96,7 +96,7 @@ impl<M> Ekf<M> {
         })
     }
 
-    /// The same with a step that was prepared before, for sensors read at a fixed rate.
+    /// Steps with a step that was prepared before, for sensors read at a fixed rate.
     ///
     /// # Errors
     /// See [`StepError`]; the belief passed in is untouched.

@@ -1,6 +1,6 @@
 use core::fmt;
 
-/// Why a step was not taken. The belief that was passed in is still the best there is.
+/// Reason for refusing a step. The belief that was passed in is still the best there is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -29,7 +29,7 @@ pub enum StepError {
 }
 
 impl StepError {
-    /// Whether the same step without its reading may well succeed: the reading is too far away, or too exact, for the numbers.
+    /// True if the same step without its reading may well succeed: the reading is too far away, or too exact, for the numbers.
     #[must_use]
     pub const fn is_of_the_reading(self) -> bool {
         matches!(self, Self::NonFiniteState | Self::NonPositiveInnovationVariance)

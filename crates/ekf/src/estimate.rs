@@ -2,7 +2,7 @@ use ohmstrain_model::{MOTION_STATES, ModelNoise, Phase, Scalar, StrainRange, Swi
 
 use crate::{Belief, Gaussian, Real, State};
 
-/// What a user wants to know, with standard deviations.
+/// Estimate reported to the user: strain, rate and the rest, with standard deviations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -18,26 +18,26 @@ pub struct Estimate<T> {
     /// R/R₀ - 1 of the sensor if it stands still at this moment: g(ε), branches and baseline over all hypotheses. In a hold it
     /// is what is read.
     pub held: Gaussian<T>,
-    /// By how much that will fall if the strain is held from now on, as [`Settling`] has it.
+    /// Amount by which that will fall if the strain is held from now on, see [`Settling`].
     pub still_relaxes: Gaussian<T>,
     /// Probability that the strain is beyond the static border, where one reading belongs to two strains; zero where
     /// the gauge curve has no peak in its range.
     pub beyond_border: T,
-    /// Whether the *ramp* border is near: the strain at which the reading, at the present speed, stops rising or falling
-    /// though the body goes on. The static border tells what a reading means at rest, this one what it tells now.
+    /// True if the *ramp* border is near: the strain at which the reading, at the present speed, stops rising or falling
+    /// though the body goes on. The static border limits what a reading tells at rest, the ramp border what it tells in motion.
     pub near_ramp_border: bool,
 }
 
-/// How readings go on where the strain is held.
+/// Relaxation of the readings while the strain is held.
 ///
-/// The law's branches say by how much a reading will have fallen after `horizon_s`. Of that `share` comes true: laws are fitted
-/// to motion and to what drifts, and their slow branches take up more than relaxes. How wrong it is grows with what is left to
-/// relax.
+/// The branches of the law predict by how much a reading will have fallen after `horizon_s`. A `share` of that comes true: laws are
+/// fitted to motion and to drift, and their slow branches absorb more than relaxation. The prediction's error grows with the
+/// relaxation that is left.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Settling<T> {
-    /// For how long the strain is held, s.
+    /// Time for which the strain is held, s.
     pub horizon_s: T,
     /// Share of the branches' relaxation that comes true.
     pub share: T,
@@ -47,11 +47,11 @@ pub struct Settling<T> {
     pub sd: T,
 }
 
-/// Hold, s, of a sensor whose holds nobody has seen.
+/// Hold, s, of a sensor without holds in its calibration.
 const UNSEEN_HORIZON_S: f64 = 60.0;
 
 impl<T: Real> Settling<T> {
-    /// Of a sensor whose holds were not seen: any share is as likely as another, and branches and baseline wander.
+    /// Settling of a sensor whose holds were not seen: any share is as likely as another, and branches and baseline wander.
     #[must_use]
     pub fn unseen(noise: &ModelNoise<T>, branches: usize) -> Self {
         let wander = noise.baseline_sd * noise.baseline_sd + T::of(branches as f64) * noise.branch_sd * noise.branch_sd;
@@ -63,7 +63,7 @@ impl<T: Real> Settling<T> {
         }
     }
 
-    /// By how much a reading falls of which the branches say `relaxes`.
+    /// Returns the expected fall of a reading if the branches relax by `relaxes`.
     fn of(&self, relaxes: T) -> Gaussian<T> {
         let unsure = self.share_sd * relaxes;
         Gaussian { mean: self.share * relaxes, variance: self.sd * self.sd + unsure * unsure }
@@ -110,8 +110,8 @@ impl<T: Real> Estimate<T> {
         }
     }
 
-    /// Where R/R₀ - 1 will be if the strain is held from now on, by the state alone. Where there is a reading, that one minus
-    /// [`Self::still_relaxes`] says it better: the law's errors up to now are in the reading.
+    /// Returns R/R₀ - 1 after the strain has been held from now on, predicted from the state alone. Where there is a reading, the reading
+    /// minus [`Self::still_relaxes`] is the better prediction: it contains the law's errors up to now.
     #[must_use]
     pub fn settled(&self) -> Gaussian<T> {
         let (held, falls) = (self.held, self.still_relaxes);
@@ -136,7 +136,7 @@ fn standing_still<T: Real, const B: usize, const N: usize, const L: usize>(
     Gaussian { mean, variance: variance.max(T::zero()) }
 }
 
-/// By how much the branches fall if nothing drives them: Σ cᵢ (1 - exp(-h/τᵢ)).
+/// Returns the fall of the branches if nothing drives them: Σ cᵢ (1 - exp(-h/τᵢ)).
 fn relaxes_within<T: Real, const B: usize, const N: usize, const L: usize>(
     model: &SwitchedModel<T, B, N>,
     belief: &Belief<T, N, L>,
@@ -162,7 +162,7 @@ fn relaxation<T: Scalar, const B: usize, const N: usize, const L: usize>(belief:
 /// Deviations to each side within which a strain is looked for.
 const NEAR: f64 = 2.0;
 
-/// Whether the reading has an extremum along the present movement, dρ/dt = 0, within two deviations of the strain. A body
+/// True if the reading has an extremum along the present movement, dρ/dt = 0, within two deviations of the strain. A body
 /// whose rate cannot be told from zero is on no ramp.
 fn near_ramp_border<T: Scalar, const B: usize, const N: usize, const L: usize>(
     model: &SwitchedModel<T, B, N>,

@@ -2,22 +2,22 @@ use ohmstrain_model::Scalar;
 
 use crate::{Belief, Gaussian, Reading, StepError};
 
-/// What every estimator has in common: a state that a prepared step turns into the next one.
+/// Common interface of all estimators: a state that a prepared step turns into the next one.
 ///
 /// The estimator is configuration, the state is the caller's; an error leaves it as it was. Outlier guards
 /// ([`Guard`](crate::Guard)) and smoothing of past steps ([`smooth_back_through`](crate::smooth_back_through)) work on any of
 /// them.
 pub trait Estimator<T: Scalar, const N: usize, const L: usize> {
-    /// What is carried from step to step.
+    /// State carried from step to step.
     type State: State<T, N, L>;
-    /// What depends on the length of a step only.
+    /// Values that depend on the length of a step only.
     type Prepared: Copy;
 
     /// Prepares steps of `dt_s ≥ 0` seconds.
     fn prepare(&self, dt_s: T) -> Self::Prepared;
 
     /// The longest step, s, over which a prediction is as good as many short ones; [`Substeps`](crate::Substeps) divides longer
-    /// ones. Infinite unless the estimator says otherwise.
+    /// ones. Infinite by default.
     fn longest_step_s(&self) -> T {
         T::one() / T::zero()
     }
@@ -71,7 +71,7 @@ pub trait Estimator<T: Scalar, const N: usize, const L: usize> {
     }
 }
 
-/// What an estimator carries from step to step.
+/// State that an estimator carries from step to step.
 pub trait State<T: Scalar, const N: usize, const L: usize>: Clone {
     /// The Gaussian with its mean and covariance.
     fn moments(&self) -> Belief<T, N, L>;
@@ -89,30 +89,30 @@ pub trait State<T: Scalar, const N: usize, const L: usize>: Clone {
     /// has no phases.
     fn phases(&self) -> Option<[T; 3]>;
 
-    /// The same state with less confidence: covariances times `factor`.
+    /// Returns the same state with less confidence: covariances times `factor`.
     #[must_use]
     fn inflated(&self, factor: T) -> Self;
 
-    /// The same state with another one beside it that has `share` of the weight, 0 to 1, from which a filter that has lost its
-    /// way may find it. Hypotheses give it a free place or that of the lightest; what has no room for another stays as it is.
+    /// Returns the state with another one beside it that has `share` of the weight, 0 to 1, from which a filter that has lost its
+    /// way may find it. In a filter of hypotheses it gets a free place or that of the lightest; a state without room for another stays as it is.
     #[must_use]
     fn beside(&self, _other: &Self, _share: T) -> Self {
         self.clone()
     }
 
-    /// The same state, of which steps keep at most so many hypotheses; what is no mixture stays as it is.
+    /// Returns the state, of which steps keep at most that many hypotheses; a state that is no mixture stays as it is.
     #[must_use]
     fn keeping(self, _most: usize) -> Self {
         self
     }
 }
 
-/// What one step of any estimator says.
+/// Result of one step of any estimator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Advanced<S, T> {
     /// The state after the reading.
     pub state: S,
-    /// How the reading compares with its prediction; `None` if it was missing.
+    /// Comparison of the reading with its prediction; `None` if the reading was missing.
     pub innovation: Option<Innovation<T>>,
 }
 

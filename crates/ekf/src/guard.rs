@@ -17,26 +17,26 @@ pub struct Guard<T> {
     patience: u32,
 }
 
-/// How much a reading may move the state.
+/// Limit on how far a reading may move the state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Influence<T> {
-    /// As much as the Kalman gain says.
+    /// No limit: the full Kalman gain.
     Full,
     /// No more than an innovation of `threshold` standard deviations (Huber, *Ann. Math. Stat.* 35 (1964) 73).
     Huber {
-        /// In standard deviations; 1.345 costs 5 % of efficiency on Gaussian readings.
+        /// Number of standard deviations; 1.345 costs 5 % of efficiency on Gaussian readings.
         threshold: T,
     },
-    /// As much as the gain says up to `threshold` standard deviations; beyond, the less the farther: an innovation of z moves the
-    /// state by threshold²/z. Costs nothing where nothing surprises, and what is far away counts for next to nothing. Of the
-    /// redescending kind (Hampel, *J. Am. Stat. Assoc.* 69 (1974) 383), with the tail of Student's t.
+    /// The full gain up to `threshold` standard deviations, and less the farther beyond: an innovation of z moves the
+    /// state by threshold²/z. It costs nothing while nothing surprises, and a far outlier counts for next to nothing. A
+    /// redescending influence (Hampel, *J. Am. Stat. Assoc.* 69 (1974) 383), with the tail of Student's t.
     Redescending {
-        /// In standard deviations.
+        /// Number of standard deviations.
         threshold: T,
     },
-    /// As if innovations followed Student's t: the weight `(ν + 1)/(ν + NIS)` falls toward zero for large ones (Lange,
+    /// Innovations as of Student's t distribution: the weight `(ν + 1)/(ν + NIS)` falls toward zero for large ones (Lange,
     /// Little, Taylor, *J. Am. Stat. Assoc.* 84 (1989) 881), and never exceeds one.
     StudentT {
         /// ν, above zero; 4 is usual.
@@ -44,12 +44,12 @@ pub enum Influence<T> {
     },
 }
 
-/// What became of a reading.
+/// Verdict of the guard on a reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ReadingVerdict {
-    /// There was none.
+    /// Missing reading.
     Missing,
     /// Taken as it is.
     Accepted,
@@ -62,12 +62,12 @@ pub enum ReadingVerdict {
     Readmitted,
     /// Nothing that this sensor can read: no reading at all, however often it comes.
     Implausible,
-    /// The same number for longer than a working sensor repeats itself; it says nothing new.
+    /// The same number for longer than a working sensor repeats itself; it carries no new information.
     Stuck,
 }
 
 impl ReadingVerdict {
-    /// Whether the reading has told the filter something.
+    /// True if the reading has updated the state.
     #[must_use]
     pub const fn is_taken(self) -> bool {
         matches!(self, Self::Accepted | Self::Downweighted | Self::Readmitted)
@@ -96,7 +96,7 @@ pub struct Guarded<S, T> {
     pub inflation: T,
     /// The reading as it was used.
     pub used: Option<Reading<T>>,
-    /// What became of the reading.
+    /// Verdict on the reading.
     pub verdict: ReadingVerdict,
     /// Rejections in a row, this one included.
     pub streak: Streak,

@@ -5,11 +5,11 @@
 //!
 //! [`Ekf`] keeps one Gaussian and has a smoother. [`Imm`], [`SignSplit`] and
 //! [`Hypotheses`] keep a [`Mixture`] of hypotheses about the phase, because stretching and releasing look alike.
-//! [`correction`] makes a calibrated filter's strain better by what was learned in calibration.
+//! [`correction`] improves a calibrated filter's strain by a correction learned in calibration.
 //!
 //! For a model of your own, [`kalman`] has linear, extended and unscented filters, smoothers and maximum likelihood.
 //!
-//! Models are anything that implements [`Dynamics`] and [`Channel`];
+//! Models are types that implement [`Dynamics`] and [`Channel`];
 //! [`SwitchedModel`](ohmstrain_model::SwitchedModel) does.
 //!
 //! # Policy
@@ -18,15 +18,15 @@
 //!   reading, a negative step and a variance that is not positive are [`StepError`]s.
 //! - Everything computed is returned: prior, innovation, its variance, log-likelihood, gain.
 //! - Covariances are packed symmetric, so they are symmetric by construction, and are updated in Joseph's form, except in the
-//!   filters on the kernel, which say so.
+//!   filters on the kernel, whose docs mention it.
 //!
 //! # Features
 //! `dual` finds Jacobians of a model in [`kalman`]; `simd` steps four hypotheses at once where the processor has AVX2, or WebAssembly
 //! its vectors; `adskalman` hands linearised steps to that crate. Off by default and
 //! without std:
 //! - `serde`: [`Belief`], mixtures, [`Estimate`], [`Gaussian`], readings, innovations, verdicts of readings and errors as plain data;
-//!   and [`live::Memory`], all that a running filter knows. A belief that comes back is not checked; the step that it cannot take is
-//!   refused. What is made by constructors that check is left out.
+//!   and [`live::Memory`], the whole state of a running filter. A belief that comes back is not checked; a step that it cannot take is
+//!   refused. Values made by constructors that check are left out.
 //! - `defmt`: `Format` for beliefs and what goes with them, but not for mixtures. It takes no text from the target, only numbers.
 //!
 //! ```

@@ -22,7 +22,7 @@ impl<T: Scalar> Residual<T> {
         T::of(-0.5) * (self.nis + self.variance.ln() + T::two_pi().ln())
     }
 
-    /// The same for [`Estimator`](crate::Estimator). What overflows a square is no reading.
+    /// Converts it for [`Estimator`](crate::Estimator). A value whose square overflows is no reading.
     pub(crate) fn with_log_likelihood(self, log_likelihood: T) -> Result<Innovation<T>, StepError> {
         let Self { innovation: value, variance, nis } = self;
         let innovation = Innovation { value, variance, nis, log_likelihood };

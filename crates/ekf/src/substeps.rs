@@ -4,7 +4,7 @@ use crate::{Advanced, Estimator, Innovation, Reading, StepError};
 
 /// An estimator that takes a long step as several short ones.
 ///
-/// How long a step may be is for the estimator to say ([`Estimator::longest_step_s`]); the steps of a long pause grow with it
+/// The estimator determines the longest step ([`Estimator::longest_step_s`]); the steps of a long pause grow with it
 /// ([`Pause`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Substeps<E>(pub E);
@@ -25,9 +25,9 @@ impl<P, T: Copy> Repeated<P, T> {
     }
 }
 
-/// A step of the longest length shall be one step, whatever rounding says.
+/// Tolerance of rounding, so that a step of the longest length is one step.
 pub const GRACE: f64 = 1.0005;
-/// Up to so many steps of the longest length a pause is divided evenly.
+/// Largest number of steps of the longest length up to which a pause is divided evenly.
 pub const EVENLY: f64 = 4.0;
 /// A step that is not of the longest length is no longer than this share of the pause that has passed: steps of 2 s within the first
 /// minute left the branches' mean half a deviation off.
@@ -58,7 +58,7 @@ pub(crate) fn is_one_step<T: Scalar>(dt_s: T, longest_s: T) -> bool {
 }
 
 impl<T: Scalar> Pause<T> {
-    /// At a reading, of an estimator whose longest step is `longest_s`.
+    /// Starts a pause at a reading, for an estimator whose longest step is `longest_s`.
     #[must_use]
     pub fn none(longest_s: T) -> Self {
         Self { longest_s, passed: T::zero(), ahead_s: T::zero() }
@@ -128,7 +128,7 @@ impl<T: Scalar> Pause<T> {
         })
     }
 
-    /// Whether more is ahead than such a step, or, of the longest length, than even steps.
+    /// True if more is ahead than such a step, or, of the longest length, than even steps.
     fn exceeds(&self, times: T) -> bool {
         let least = if times > T::one() { times } else { T::of(EVENLY) };
         self.ahead_s > least * self.longest_s * T::of(GRACE)
@@ -152,7 +152,7 @@ impl<T: Scalar> Pause<T> {
 }
 
 impl<E> Substeps<E> {
-    /// At a reading.
+    /// Starts a pause at a reading.
     pub fn pause<T, const N: usize, const L: usize>(&self) -> Pause<T>
     where
         T: Scalar,

@@ -4,16 +4,16 @@ use ohmstrain_model::{
 
 use crate::Belief;
 
-/// How the state moves in time. `L = N (N + 1) / 2`.
+/// Model of the state's motion in time. `L = N (N + 1) / 2`.
 pub trait Dynamics<T: Scalar, const N: usize, const L: usize> {
-    /// What depends on the length of a step only.
+    /// Values that depend on the length of a step only.
     type Prepared: Copy;
 
     /// Prepares steps of `dt_s ≥ 0` seconds.
     fn prepare(&self, dt_s: T) -> Self::Prepared;
 
-    /// The longest step, s, over which [`Self::transition`] is as good as many short ones; infinite unless the model says
-    /// otherwise.
+    /// The longest step, s, over which [`Self::transition`] is as good as many short ones; infinite by
+    /// default.
     fn longest_step_s(&self) -> T {
         T::one() / T::zero()
     }
@@ -28,7 +28,7 @@ pub trait Dynamics<T: Scalar, const N: usize, const L: usize> {
     }
 }
 
-/// How a scalar reading depends on the state.
+/// Model of a scalar reading as a function of the state.
 pub trait Channel<T: Scalar, const N: usize, const L: usize> {
     /// The reading expected at the belief's mean, its gradient and the variance of its noise; `phase` as for
     /// [`Dynamics::transition`].
@@ -87,15 +87,15 @@ pub struct Reading<T> {
 }
 
 impl<T: Number> Reading<T> {
-    /// With so much more noise that the innovation's variance S becomes S/w: the gain, and with it the step, is w times as
-    /// large.
+    /// Returns the reading with so much more noise that the innovation's variance S becomes S/w: the gain, and with it the step, is w
+    /// times as large.
     #[must_use]
     pub fn weighted(self, weight: T, variance: T) -> Self {
         Self { extra_variance: self.extra_variance + variance * (T::one() / weight - T::one()), ..self }
     }
 
-    /// With more noise than it has beside a channel's own `variance`, by a factor, where it is more exact than numbers of such
-    /// a rounding; `None` if it is so far away that noise is of no use.
+    /// Returns the reading with more noise, by a factor, if it is more exact than numbers of such a rounding allow beside a channel's own
+    /// `variance`; `None` if it is so far away that noise is of no use.
     #[must_use]
     pub fn coarser(self, variance: T, rounding: T) -> Option<Self> {
         // A relative reading of order one is not known better than this.

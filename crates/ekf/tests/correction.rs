@@ -371,7 +371,7 @@ fn features_are_bounded() {
     assert!(after(0.1 + 2.9 * 0.5) != after(40.0) && after(0.1 - 2.9 * 0.5) != after(-40.0));
 }
 
-/// What a start is off by fades as exp(−t/τ) and nothing else changes, since low-passes are linear.
+/// The error of a start fades as exp(−t/τ) and nothing else changes, since low-passes are linear.
 #[test]
 fn low_passes_start_where_they_are_told_to_and_forget_it() {
     let starts: [[f64; 2]; 6] = std::array::from_fn(|i| [0.1 * i as f64, 0.9 - 0.1 * i as f64]);

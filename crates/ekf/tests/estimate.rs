@@ -1,4 +1,4 @@
-//! What an estimate says of borders, and what a smoother makes of a prediction that was cut, against closed forms.
+//! Borders in an estimate, and smoothing of a prediction that was cut, against closed forms.
 
 use nalgebra::{SVector, vector};
 use ohmstrain_ekf::{Belief, Dynamics, Estimate, Estimator, Evidence, Gaussian, Mixture, Settling, SignSplit, State};
@@ -58,7 +58,7 @@ fn relaxation_and_baseline_are_told_apart() {
     assert_eq!((estimate.relaxation.mean, estimate.baseline), (0.02, 0.03));
 }
 
-/// On a straight curve what a mixture reads in a hold is a sum, whose variance is w P wᵀ of all hypotheses together, and falls
+/// The reading of a mixture in a hold, on a straight curve, is a sum, whose variance is w P wᵀ of all hypotheses together. It falls
 /// by a share of the branch's relaxation.
 #[test]
 fn a_held_strain_settles_by_what_is_left_to_relax() {
@@ -84,7 +84,7 @@ fn a_held_strain_settles_by_what_is_left_to_relax() {
     assert_eq!(estimate.relaxation, Gaussian { mean: all.mean[2], variance: all.covariance[(2, 2)] });
 }
 
-/// Where the law is right, it is what a sensor reads that is held for that long: a hold of 30 s in steps of a millisecond,
+/// A correct law predicts the reading of a sensor that is held for that long: a hold of 30 s in steps of a millisecond,
 /// ċ = -c/τ by Euler's rule, on a curved gauge.
 #[test]
 fn a_law_that_is_right_says_what_is_read_after_the_hold() {
@@ -114,7 +114,7 @@ fn an_unseen_hold_may_relax_by_any_share() {
     assert!((falls.variance - relaxes * relaxes / 12.0 - wander).abs() < 1e-15);
 }
 
-/// On a ramp dρ/dε = 1.9 - 5.6 ε + k - c/(τ v), which is zero at one strain.
+/// The ramp border is at the one strain where dρ/dε = 1.9 - 5.6 ε + k - c/(τ v) is zero.
 #[test]
 fn the_ramp_border_is_where_the_reading_stops_changing() {
     let model = model([1.9, -2.8, 0.0], [-0.5, -0.2]);

@@ -235,8 +235,8 @@ const QUIET: f64 = 1e-5;
 /// Some thirty operations of a step, one after the other, on sums of up to ten terms.
 const ROUNDING: f64 = 300.0;
 
-/// So do filters of hypotheses, however quiet the model: cut at rate zero and merged, correlations are rounded to more than they can
-/// be, and no noise of a reading mends that.
+/// Filters of hypotheses take precise readings, too, however quiet the model: after cuts at rate zero and merging, rounded correlations
+/// exceed one, and no noise of a reading mends that.
 #[test]
 fn mixtures_take_precise_readings_too() {
     for quiet in [1.0, 3e-2, 1e-2, 1e-3, 1e-4] {
@@ -348,7 +348,7 @@ fn parameters_without_meaning_are_refused() {
     }
 }
 
-/// What the numbers cannot take is turned down like any other outlier, without a gate too, and the step is a prediction.
+/// Readings beyond the range of the numbers are rejected like any other outlier, without a gate too, and the step is a prediction.
 #[test]
 fn no_reading_ends_a_run() {
     let model = model::<f64>(RISING);

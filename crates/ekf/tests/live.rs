@@ -7,7 +7,7 @@ use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, SensorLaw, StrainRange,
 const DT_S: f32 = 0.01;
 const LIMITS: StrainRange<f32> = StrainRange { lower: 0.0, upper: 0.33 };
 const REST_READING: f32 = 1600.0;
-/// What the rested sensor read in calibration.
+/// Reading of the rested sensor in calibration.
 const RESTED: f32 = 1550.0;
 
 type Filter = LiveFilter<f32, SignSplit<f32, 1, 4, 8, Compact>, Learned<'static, f32>, 4, 10>;

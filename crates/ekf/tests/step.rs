@@ -1,4 +1,4 @@
-//! What every step must keep, whatever the model.
+//! Properties of every step, whatever the model.
 
 use nalgebra::SVector;
 use ohmstrain_ekf::{
@@ -72,7 +72,7 @@ proptest! {
         }
     }
 
-    /// Without readings a step is the model's transition and nothing else, and steps of zero seconds do nothing.
+    /// A step without a reading is the model's transition and nothing else, and steps of zero seconds do nothing.
     #[test]
     fn missing_readings_are_predictions(rows in readings()) {
         let model = sensor::<f64>(1.0);
@@ -134,7 +134,7 @@ fn bad_input_is_refused_by_name() {
     assert!(ekf.step(&belief, 86_400.0, Some(Reading::from(0.1))).unwrap().posterior.is_finite());
 }
 
-/// What the electronics add to a reading's variance makes it count for less.
+/// The variance that electronics add to a reading makes it count for less.
 #[test]
 fn a_coarser_reading_moves_the_belief_less() {
     let model = sensor::<f64>(1.0);
@@ -203,7 +203,7 @@ fn the_kernels_curves_are_those_of_the_law() {
     }
 }
 
-/// At rest it is that of half a normal distribution; elsewhere as the model has it.
+/// The variance at rest is that of half a normal distribution; elsewhere it is the model's.
 #[test]
 fn a_compact_split_leaves_the_variance_of_its_probabilities() {
     for sd in [0.02_f64, 3.0] {

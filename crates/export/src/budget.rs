@@ -101,7 +101,7 @@ impl Budget {
 }
 
 impl Room {
-    /// What a filter takes too much of, in words; `None` if it fits.
+    /// Returns the resource that a filter takes too much of, in words; `None` if it fits.
     fn lacks(&self, cost: &Cost) -> Option<String> {
         let all = [
             (cost.instructions, self.instructions, "instructions"),
@@ -124,11 +124,11 @@ pub struct Candidate {
     pub words: String,
     /// Cost on the budget's processor.
     pub cost: Cost,
-    /// What it takes too much of; `None` if it fits.
+    /// Resource that it takes too much of; `None` if it fits.
     pub lacks: Option<String>,
 }
 
-/// How much of the correction is left.
+/// Part of the correction that is left.
 #[derive(Clone, Copy)]
 enum Left {
     All,

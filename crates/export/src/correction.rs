@@ -111,7 +111,7 @@ fn narrowed<'a>(numbers: impl IntoIterator<Item = &'a f64>) -> Vec<Literal> {
 }
 
 impl CorrectionConstants {
-    /// Of a correction.
+    /// Computes the constants of a correction.
     pub fn new(correction: &PortableCorrection, quadratics: Option<&[OwnedQuadratic; 2]>, dt_s: f32) -> Self {
         let PortableCorrection { features, learned } = correction;
         let scales = &learned.scales;

@@ -57,7 +57,7 @@ const EKF: OfKind = OfKind {
     flash_branch: 2800.0,
     stack: [695.0, 185.0, 0.0, 0.0],
 };
-/// The same on an AVR, as lists of operations (`arithmetic/listed.rs`): cycles in simavr and avr-gcc's -Os, by `scripts/exported-c.sh`.
+/// Cost of the EKF on an AVR, as lists of operations (`arithmetic/listed.rs`): cycles in simavr and avr-gcc's -Os, by `scripts/exported-c.sh`.
 const EKF_ON_AVR: OfKind = OfKind {
     step: 179_000.0,
     hypothesis: 0.0,
@@ -67,8 +67,8 @@ const EKF_ON_AVR: OfKind = OfKind {
     flash_branch: 2450.0,
     stack: [736.0, 126.0, 0.0, 0.0],
 };
-/// Where the motion is clear fewer hypotheses part than in the motion of the self-test: then a step takes up to a third less. Two
-/// hypotheses are merged in less than their share of what eight take, which the step's negative number stands for.
+/// Costs of the sign-split filter. In a clear motion fewer hypotheses split than in the motion of the self-test: then a step takes up to a
+/// third less. Merging two hypotheses costs less than their share of the cost of eight, hence the step's negative number.
 const SIGN_SPLIT: OfKind = OfKind {
     step: -1900.0,
     hypothesis: 3900.0,
@@ -123,8 +123,8 @@ struct Times {
 }
 
 impl Processor {
-    /// From docs/costs.md, the largest for each kind. What is compiled for an AVR took 236 403 cycles in simavr where the Cortex-M4F
-    /// took 1898 instructions, of an extended Kalman filter; others as much more as on a Cortex-M0+.
+    /// Returns the factors from docs/costs.md, the largest for each kind. On an AVR an extended Kalman filter took 236 403 cycles in simavr,
+    /// on the Cortex-M4F 1898 instructions; for others the ratio to a Cortex-M0+ is assumed to be the same.
     const fn times(self) -> Times {
         match self {
             Self::Single => Times { instructions: [1.0; 3], flash: 1.0 },
@@ -135,7 +135,7 @@ impl Processor {
 }
 
 impl Cost {
-    /// Of the same filter on another processor than a Cortex-M4F.
+    /// Returns the cost of the same filter on another processor than a Cortex-M4F.
     #[must_use]
     pub fn on(self, processor: Processor, law: &LawParams, chip: &ChipFilter) -> Self {
         if processor == Processor::Avr && chip.filter.kind == EstimatorKind::Ekf && chip.filter.correction.is_none() {
@@ -151,8 +151,8 @@ impl Cost {
         Self { instructions: times(self.instructions, instructions[kind]), flash: times(self.flash, flash), ..self }
     }
 
-    /// Of a filter of a law, that moves on so many hypotheses in a step, `work` (1 for a single Gaussian; what surprises is
-    /// taken twice).
+    /// Returns the cost of a filter of a law that propagates `work` hypotheses in a step (1 for a single Gaussian; a surprising reading
+    /// counts twice).
     pub fn of(law: &LawParams, chip: &ChipFilter, work: f64) -> Self {
         let kind = match chip.filter.kind {
             EstimatorKind::SignSplit => &SIGN_SPLIT,

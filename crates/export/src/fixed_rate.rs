@@ -20,16 +20,16 @@ pub struct FixedRate<'a, const B: usize, const N: usize> {
     pub reference: SwitchedModel<f64, B, N>,
     /// The model in single precision.
     pub model: SwitchedModel<f32, B, N>,
-    /// How many hypotheses it keeps; 1 if it keeps none.
+    /// Number of hypotheses that it keeps; 1 if it keeps none.
     pub hypotheses: usize,
-    /// Everything else.
+    /// All other parts.
     pub parts: Parts<'a>,
     /// Constants that depend on the length of a step.
     pub table: StepTable,
 }
 
 impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
-    /// Of a sensor, at `dt_s` seconds from reading to reading.
+    /// Prepares a sensor's filter for readings every `dt_s` seconds.
     ///
     /// # Errors
     /// See [`ExportError`].
@@ -116,7 +116,7 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
         Numbers { of: Box::new(of), length_s: |dt_s| dt_s }
     }
 
-    /// The same in double precision, as the law has it, for lengths to a nanosecond: as the library has it.
+    /// Returns the numbers in double precision, with the law's own, for lengths to a nanosecond, as in the library.
     pub fn exact(&self) -> Numbers<'_, f64> {
         let of = |step_s| {
             let numbers = exact_numbers(&self.reference, self.parts.phases, step_s);

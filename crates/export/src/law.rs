@@ -62,7 +62,7 @@ pub struct PhaseConstants {
 }
 
 impl LawConstants {
-    /// Of a law.
+    /// Converts the constants of a law.
     pub fn new<const B: usize>(law: &SensorLaw<f32, B>) -> Self {
         let branch = |branch: &Branch<f32>| BranchConstants {
             tau_s: Literal(branch.tau_s),
@@ -80,7 +80,7 @@ impl LawConstants {
 }
 
 impl NoiseConstants {
-    /// Of a noise.
+    /// Converts the constants of a noise.
     pub const fn new(noise: &ModelNoise<f32>) -> Self {
         Self {
             reading_sd: Literal(noise.reading_sd),
@@ -92,7 +92,7 @@ impl NoiseConstants {
 }
 
 impl PhaseConstants {
-    /// Of phases.
+    /// Converts the constants of phases.
     pub const fn new(phases: &PhaseParams) -> Self {
         Self {
             hold_time_s: Literal(phases.hold_time_s as f32),
@@ -105,7 +105,7 @@ impl PhaseConstants {
 }
 
 impl PriorConstants {
-    /// Of a motion.
+    /// Converts the constants of a motion.
     pub const fn new(motion: &MotionParams) -> Self {
         Self {
             rate_time_s: Literal(motion.rate_time_s as f32),

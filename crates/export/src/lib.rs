@@ -48,7 +48,7 @@ pub enum ExportTarget {
 
 /// A file to write.
 pub struct SourceFile {
-    /// Where it belongs in the folder.
+    /// Path in the folder.
     pub path: String,
     /// Its text.
     pub content: String,
@@ -58,7 +58,7 @@ pub struct SourceFile {
 pub const FILTERS: [EstimatorKind; 4] =
     [EstimatorKind::Corrected, EstimatorKind::SignSplit, EstimatorKind::Hypotheses, EstimatorKind::Ekf];
 
-/// Why there is no source code.
+/// Reason for having no source code.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
     /// The sensor has something that the exported filter has no form for.
@@ -66,7 +66,7 @@ pub enum ExportError {
     Unsupported {
         /// The part of the sensor.
         what: String,
-        /// How to get a sensor file without it.
+        /// Way to a sensor file without it.
         instead: &'static str,
     },
     /// A parameter that `f32`, or the filter, cannot work with.
@@ -83,7 +83,7 @@ pub enum ExportError {
     Budget {
         /// Cost of the smallest filter.
         least: Cost,
-        /// What it takes too much of.
+        /// Resource that it takes too much of.
         lacks: String,
     },
     /// The template failed.

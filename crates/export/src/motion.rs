@@ -8,7 +8,7 @@ use rand_distr::{Distribution, StandardNormal};
 /// Seed of the noise.
 pub const SEED: u64 = 1;
 
-/// Where the strain is after so many steps in all, as a share of the range: rest, stretch, hold, release, hold, half-way.
+/// Corners of the strain's path: number of steps so far, and strain as a share of the range. Rest, stretch, hold, release, hold, half-way.
 const CORNERS: [(usize, f64); 7] =
     [(0, 0.02), (20, 0.02), (100, 0.95), (150, 0.95), (230, 0.05), (260, 0.05), (300, 0.5)];
 

@@ -11,9 +11,9 @@ use super::{ExportError, parameter};
 pub struct Plan {
     /// The estimator; the sensor's default if `None`.
     pub kind: Option<EstimatorKind>,
-    /// How many hypotheses it keeps; as many as on a computer if `None`.
+    /// Number of hypotheses to keep; as many as on a computer if `None`.
     pub hypotheses: Option<usize>,
-    /// How much of the correction; all of it if `None`.
+    /// Part of the correction to keep; all of it if `None`.
     pub rows: Option<Rows>,
 }
 

@@ -1,4 +1,4 @@
-//! A quadratic function of a correction's inputs: most of what a smooth Gaussian process says, at little cost.
+//! Quadratic function of a correction's inputs: most of a smooth Gaussian process, at little cost.
 
 use nalgebra::{DMatrix, DVector};
 use ohmstrain_ekf::correction::Quadratic;
@@ -6,14 +6,14 @@ use ohmstrain_ekf::correction::Quadratic;
 /// Owned numbers of a [`Quadratic`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct OwnedQuadratic<T = f64> {
-    /// Of the inputs.
+    /// Coefficients of the inputs.
     pub linear: Vec<T>,
-    /// Of their products, the lower triangle row by row.
+    /// Coefficients of their products, the lower triangle row by row.
     pub square: Vec<T>,
 }
 
 impl<T> OwnedQuadratic<T> {
-    /// As a correction borrows it.
+    /// Borrows it in the form that a correction takes.
     pub fn borrowed(&self) -> Quadratic<'_, T> {
         Quadratic { linear: &self.linear, square: &self.square }
     }

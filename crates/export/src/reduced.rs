@@ -1,10 +1,10 @@
 //! A learned correction with fewer rows: from the sensor's file alone, nothing is learned again.
 //!
 //! The mean of a process with a long length scale is nearly quadratic within the range of its rows. So the means become a
-//! quadratic function and kernels of the rows that say most (the first ones: a correction lists its inducing rows first, in
+//! quadratic function and kernels of the most informative rows (the first ones: a correction lists its inducing rows first, in
 //! the order of a pivoted Cholesky decomposition), fitted to the processes' own means. Variances take the kernels of
-//! fewer inducing rows, onto which those of the others are projected, as the others are projected already (Nyström). What simulated
-//! rows say is left out.
+//! fewer inducing rows, onto which those of the others are projected, as the others are projected already (Nyström). The process of
+//! simulated rows is left out.
 
 use nalgebra::{DMatrix, DVector};
 use ohmstrain_ekf::correction::{self, FILTER_INPUTS, OUTPUTS, kernel};
@@ -20,7 +20,7 @@ type Process = OwnedProcess<f64, FILTER_INPUTS>;
 const BETWEEN: [usize; 4] = [1, 2, 4, 8];
 const BEYOND: [usize; 2] = [2, 5];
 const AS_FAR: f64 = 0.7;
-/// And in rows whose inputs are other rows', with this weight: within the range of the rows, like nothing that was seen.
+/// Weight of rows whose inputs are mixed from other rows': within the range of the rows, unlike any row that was seen.
 const MIXED_WEIGHT: f64 = 0.03;
 const MIXED: [usize; 2] = [1, 2];
 /// A prime: other inputs come from far apart rows.
@@ -28,7 +28,7 @@ const APART: usize = 17;
 /// Keeps kernels of inducing rows regular; less than the processes' own jitter.
 const JITTER: f64 = 1e-8;
 
-/// Which of the two processes.
+/// Choice between the two processes.
 #[derive(Clone, Copy)]
 enum Which {
     Direct,
@@ -52,12 +52,12 @@ impl Which {
     }
 }
 
-/// How many rows of a correction are left.
+/// Number of rows of a correction that are left.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rows {
-    /// For its means, beside a quadratic function.
+    /// Rows for its means, beside a quadratic function.
     pub mean: usize,
-    /// For its variances.
+    /// Rows for its variances.
     pub variance: usize,
 }
 
@@ -114,7 +114,7 @@ fn explained(full: &Process, which: Which, rows: &[&Row], few: usize) -> Option<
     Some(OwnedTriangle::new(few, |i, j| triangle[(i, j)]))
 }
 
-/// Where means are to be right, and how much it matters.
+/// Returns the points at which means are to be right, with their weights.
 fn points(rows: &[Row]) -> Vec<(Row, f64)> {
     let range: [(f64, f64); FILTER_INPUTS] = std::array::from_fn(|i| {
         let column = rows.iter().map(|row| row[i]);

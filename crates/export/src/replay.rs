@@ -11,7 +11,7 @@ use super::{ExportError, too_many_branches};
 
 /// A row of a recording; a missing reading is NaN.
 pub struct ReplayedRow {
-    /// Since the row before, or the first since the start, s.
+    /// Time since the row before, or of the first one since the start, s.
     pub since_s: f32,
     /// The reading, in the sensor's unit.
     pub reading: f64,
@@ -30,7 +30,7 @@ pub struct Said<T = f32> {
     pub flags: u32,
 }
 
-/// Every row of a recording, as the exported program in single precision reports it.
+/// Returns every row of a recording as the exported program reports it, in single precision.
 ///
 /// # Errors
 /// See [`ExportError`].

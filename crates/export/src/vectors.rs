@@ -48,8 +48,8 @@ const PREDICTION: f64 = 0.75;
 const RESTED: usize = 20;
 const ANOTHER_DAY: f32 = 1.08;
 
-/// How many times further than Rust's `f32` filter, or than one rounding of the readings takes it, another one may be from exact
-/// arithmetic.
+/// Factor by which another filter may be further from exact arithmetic than Rust's `f32` filter, or than one rounding of the readings
+/// moves that.
 const FURTHER: f64 = 3.0;
 
 impl Vectors {

@@ -4,10 +4,10 @@ use crate::motion::MOTION_STATES as M;
 use crate::{Direction, Phase, Scalar, SwitchedModel, SwitchedStep, Transition};
 
 impl<T: Scalar, const B: usize, const N: usize> SwitchedModel<T, B, N> {
-    /// What the motion does to the branches: gain at mid-strain times mean rate over the step.
+    /// Drives the branches by the motion: gain at mid-strain times mean rate over the step.
     ///
-    /// Noise of branch i is `γᵢ wᵢ + strain_pull · n_ε`, because its gain depends on where the motion goes, and what an
-    /// uncertain direction leaves open, which is one number for all branches.
+    /// The noise of branch i is `γᵢ wᵢ + strain_pull · n_ε`, because its gain depends on the course of the motion, plus the noise of an
+    /// uncertain direction, which is one number for all branches.
     pub(crate) fn drive_branches<const L: usize>(
         &self,
         step: &SwitchedStep<T, B>,

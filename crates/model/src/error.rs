@@ -7,11 +7,11 @@ use core::fmt;
 pub struct ParameterError {
     /// The parameter, as it is called in code and in files.
     pub parameter: &'static str,
-    /// What is wrong with it.
+    /// Problem with it.
     pub problem: Problem,
 }
 
-/// What is wrong with a parameter.
+/// Problem with a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -12,7 +12,7 @@ pub struct Ohms<T> {
     pub sd_ohm: T,
 }
 
-/// What an analogue-to-digital converter delivered.
+/// Result of an analogue-to-digital conversion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -23,7 +23,7 @@ pub enum AdcCode<T> {
     Saturated,
 }
 
-/// Where the sensor sits in a voltage divider.
+/// Position of the sensor in a voltage divider.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -61,7 +61,7 @@ impl<T: Scalar> Gauge<T> {
     /// tunnel never touch.
     ///
     /// # Errors
-    /// Says that the range is too wide for the gauge.
+    /// If the range is too wide for the gauge.
     pub(crate) fn validate_within(&self, lower: T, upper: T) -> Result<(), ParameterError> {
         let mut ends = [lower, upper, lower];
         if let Self::Tunnelling { gap, barrier, path_loss } = *self {

@@ -40,7 +40,7 @@ impl<T: Number> StrainRange<T> {
         strain.max(self.lower).min(self.upper)
     }
 
-    /// Whether `strain` lies in the range, ends included.
+    /// True if `strain` lies in the range, ends included.
     #[must_use]
     pub fn contains(&self, strain: T) -> bool {
         strain >= self.lower && strain <= self.upper
@@ -78,7 +78,7 @@ pub struct SensorLaw<T, const B: usize> {
     /// The branches, fastest first by convention.
     #[cfg_attr(feature = "serde", serde(with = "serde_big_array::BigArray"))]
     pub branches: [Branch<T>; B],
-    /// Where the law holds.
+    /// Range in which the law holds.
     pub range: StrainRange<T>,
 }
 

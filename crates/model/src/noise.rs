@@ -1,7 +1,7 @@
 use crate::Scalar;
 use crate::error::{ParameterError, Problem};
 
-/// What the law does not explain, in units of ρ = R/R₀ - 1.
+/// Part of the reading that the law does not explain, in units of ρ = R/R₀ - 1.
 ///
 /// Sensor noise is a small part of it: model error, slowly varying, is ten to a hundred times larger. Putting it into
 /// `reading_sd` as white noise makes a filter overconfident; it belongs into the baseline and the branches.

@@ -1,6 +1,6 @@
 use crate::Scalar;
 
-/// What the body does with the sensor: the law's gains and dash-pot depend on it.
+/// Movement of the body: the law's gains and dash-pot depend on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -28,7 +28,7 @@ impl Phase {
     }
 }
 
-/// Which of the law's two sets of gains a step uses.
+/// Direction of a step: it selects one of the law's two sets of gains.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Direction<T> {
     /// The phase is given: a hypothesis, or known from elsewhere.
@@ -38,7 +38,7 @@ pub enum Direction<T> {
     Within {
         /// A moving phase: the sign at the end.
         phase: Phase,
-        /// What turning around adds to the path.
+        /// Path that turning around adds.
         turning: Turning<T>,
     },
     /// The phase is not known, only that the rate is Gaussian around its prediction. Each set of gains is driven by the
@@ -47,8 +47,8 @@ pub enum Direction<T> {
     Uncertain {
         /// Standard deviation of the rate over the step, 1/s.
         rate_sd: T,
-        /// How many times more variance of what the linearisation leaves adds up, over many steps, than if it were drawn anew
-        /// in each: it lasts as long as the rate's error does, longer than a short step and not as long as a long one.
+        /// Factor by which the variance of the linearisation error over many steps exceeds that of errors drawn anew in each
+        /// step: the error lasts as long as the rate's error does, longer than a short step and not as long as a long one.
         persistence: T,
     },
 }
@@ -78,7 +78,7 @@ pub fn unexplained<T: Scalar>(extends: T, retracts: T, variance: T) -> T {
 /// Steepness of the logistic distribution that stands for the normal one: `Φ(r) ≈ 1/(1 + exp(-1.702 r))`.
 pub(crate) const STEEPNESS: f64 = 1.702;
 
-/// How a rate splits between stretching and releasing.
+/// Split of a rate between stretching and releasing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SplitRate<T> {
     /// Expected stretching rate, not negative.

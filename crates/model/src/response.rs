@@ -1,7 +1,7 @@
 use crate::motion::MOTION_STATES as M;
 use crate::{Branch, Motion, Scalar};
 
-/// How motion and branches of unit gain answer over one time step: everything in the transition that depends on the
+/// Response of the motion and of branches of unit gain over one time step: everything in the transition that depends on the
 /// step's length and not on the state. Compute it once for a fixed step.
 ///
 /// With m the motion states (ε, v) and c a branch of gain 1,
@@ -24,7 +24,7 @@ pub struct Response<T, const B: usize> {
     pub motion_noise: [[T; M]; M],
     /// `exp(-dt/τ) - 1` of each branch.
     pub decay_change: [T; B],
-    /// What each motion state at the start adds to each branch.
+    /// Contribution of each motion state at the start to each branch.
     pub drive: [[T; M]; B],
     /// Answer of each branch to a unit push.
     pub drive_input: [T; B],
@@ -189,7 +189,7 @@ struct Series<T, const B: usize> {
 }
 
 impl<T: Scalar, const B: usize> Series<T, B> {
-    /// From motion state `start` = 1 and everything else 0.
+    /// Computes the series that starts from motion state `start` = 1 and everything else 0.
     fn from_unit(start: usize, motion: &Motion<T>, branches: &[Branch<T>; B]) -> Self {
         let mut series = Self { motion: [[T::zero(); M]; TERMS], branches: [[T::zero(); B]; TERMS] };
         series.motion[0][start] = T::one();

@@ -1,7 +1,7 @@
-//! What the direction of motion leaves open over a step: a rate whose sign is not known, or that turns around on the way.
+//! Path that the direction of motion leaves open over a step: of a rate whose sign is not known, or that turns around on the way.
 //!
-//! Branches are driven by the path that the body goes, each way with a gain of its own. A Gaussian knows the net move and
-//! what its direction probably was; here stands what that leaves, as a mean and a variance.
+//! Branches are driven by the path of the body, each way with a gain of its own. A Gaussian knows the net move and
+//! the probability of its direction; this module adds the rest of the path, as a mean and a variance.
 
 use nalgebra::SVector;
 
@@ -12,13 +12,13 @@ use crate::{Branch, Motion, Phase, Scalar, SwitchedModel, SwitchedStep, Symmetri
 /// `1 - r²` of neighbouring steps from which on it counts as no less: a persistence of 10⁴ steps.
 pub const LEAST_LEFT: f64 = 2e-4;
 
-/// Of a Brownian rate that passes zero with unit density and changes by one standard deviation over a step of unit length:
-/// the mean path beyond what the sign at the end makes of the net move, ¼, and the variance of that path given the rates
+/// Mean path beyond the net move with the sign at the end, ¼, for a Brownian rate that passes zero with unit density and
+/// changes by one standard deviation over a step of unit length. Below, the variance of that path given the rates
 /// at both ends, by simulation.
 const BROWNIAN_EXCESS: f64 = 0.25;
 const BROWNIAN_VARIANCE: f64 = 0.0537;
-/// How far from zero, in standard deviations of its change over the step, a rate starts that turns around: where its density
-/// falls off within that distance there is less to turn around. 1.27 from an exponential density, 0 from a flat one.
+/// Distance from zero, in standard deviations of its change over the step, at which a rate starts that turns around: if its density
+/// falls off within that distance, fewer rates turn around. 1.27 from an exponential density, 0 from a flat one.
 const REACH: f64 = 0.6;
 /// A rate that changes evenly by w and passes zero: the path beyond the net move's is `a²/w` if `a` of w lie beyond zero, in
 /// the mean `w/3`; times the probability w that it passes.
@@ -30,8 +30,8 @@ const LONGEST: f64 = 1.0 / 3.0;
 /// 1/√(2π).
 const NORMAL_DENSITY: f64 = 0.398_942_280_401_432_7;
 
-/// What is left of the steps' persistence where a step is no longer short against the motion's memory: such that without
-/// readings the variance of what the direction leaves grows at one rate, whatever the step. A rate with white acceleration
+/// Factor on the steps' persistence for a step that is no longer short against the motion's memory. With it the variance
+/// that the direction leaves open grows at one rate without readings, whatever the step. A rate with white acceleration
 /// correlates as exp(-t/T_v) and its direction as the square of that, whose steps sum up to coth(h/T_v).
 pub(crate) fn averaging<T: Scalar>(motion: &Motion<T>, dt_s: T) -> T {
     let x = dt_s * motion.restoring()[1];
@@ -39,16 +39,16 @@ pub(crate) fn averaging<T: Scalar>(motion: &Motion<T>, dt_s: T) -> T {
 }
 
 impl<T: Scalar> Direction<T> {
-    /// How many times more variance adds up over steps than if it were drawn anew in each.
+    /// Returns the factor by which variance over steps exceeds that of errors drawn anew in each.
     pub(crate) fn persistence(self) -> T {
         if let Self::Uncertain { persistence, .. } = self { persistence } else { T::one() }
     }
 }
 
 impl<T: Scalar, const B: usize, const N: usize> SwitchedModel<T, B, N> {
-    /// What one Gaussian knows of the direction over a step, from the covariance at its start.
+    /// Returns the direction over a step as one Gaussian knows it, from the covariance at the step's start.
     ///
-    /// The rate's variance is that in the middle of the step. What the linearised switch leaves follows the error of the
+    /// The rate's variance is that in the middle of the step. The error of the linearised switch follows the error of the
     /// rate, and lasts as long: the squares of that error's correlations from step to step are summed up, a
     /// geometric series.
     #[must_use]
@@ -81,10 +81,10 @@ impl<T: Scalar, const B: usize, const N: usize> SwitchedModel<T, B, N> {
         if self.law().branches.iter().all(same) { T::one() / T::zero() } else { T::of(LONGEST) / per_time }
     }
 
-    /// What a rate whose sign is known at the start of a step, and again at its end, leaves open in between.
+    /// Returns the open path of a rate whose sign is known at the start of a step, and again at its end.
     ///
-    /// How often it turns around is told by its density at zero. That of a belief which was cut there is not the Gaussian's,
-    /// but between an exponential's and the Gaussian's: `exp(1 - u²)/σ` at u deviations has both ends, and is 2 % off for
+    /// The density of the rate at zero determines how often it turns around. The density of a belief that was cut there is not the
+    /// Gaussian's, but between an exponential's and the Gaussian's: `exp(1 - u²)/σ` at u deviations has both ends, and is 2 % off for
     /// one half of a Gaussian.
     #[must_use]
     pub fn turning<const L: usize>(
@@ -121,14 +121,14 @@ pub fn correlated_steps<T: Scalar>(ahead: T, together: T, fresh: T) -> T {
     (square + both) / if left > least { left } else { least }
 }
 
-/// How a rate changes over a step, positive away from zero.
+/// Change of a rate over a step, positive away from zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RateChange<T> {
     /// Expected, 1/s.
     pub expected: T,
     /// Variance from what is not known at the start of the step, and from chance on the way; 1/s².
     pub spread: T,
-    /// From chance on the way, as of a Brownian rate.
+    /// Variance from chance on the way, as of a Brownian rate.
     pub noise: T,
 }
 
@@ -137,11 +137,11 @@ pub struct RateChange<T> {
 pub struct TurningNumbers {
     /// Deviations from zero at which no rate turns around.
     pub clear: f64,
-    /// How far from zero a rate starts that turns around, in deviations of its change.
+    /// Distance from zero at which a rate starts that turns around, in deviations of its change.
     pub reach: f64,
     /// Path beyond the net move's of an even change, over the product of the change and its probability.
     pub even_excess: f64,
-    /// The same of a Brownian one, and its variance.
+    /// Excess of a Brownian rate, and its variance.
     pub brownian: (f64, f64),
     /// 1/√(2π).
     pub normal_density: f64,
@@ -157,7 +157,7 @@ pub const TURNING: TurningNumbers = TurningNumbers {
 };
 
 impl<T: Scalar> Turning<T> {
-    /// Of a rate, positive away from zero, with its variance. A microcontroller's own square root comes in as `root`.
+    /// Computes the open path of a rate, positive away from zero, with its variance. A microcontroller passes its own square root as `root`.
     #[inline(always)]
     pub fn new(rate: T, rate_variance: T, change: &RateChange<T>, root: impl Fn(T) -> T) -> Self {
         let zero = T::zero();

@@ -15,8 +15,8 @@ pub trait Scalar: RealField + Copy {
 
 impl<T: RealField + Copy> Scalar for T {}
 
-/// What is computed number by number, and no more than that asks for: any [`Scalar`], or an expression that stands for a number and
-/// writes down what is done with it. A comparison chooses a way.
+/// Operations of a computation number by number, and no more: any [`Scalar`], or an expression that stands for a number and
+/// records the operations on it. A comparison chooses a way.
 pub trait Number:
     Copy
     + PartialOrd
@@ -37,7 +37,7 @@ pub trait Number:
     /// The smaller one.
     #[must_use]
     fn min(self, other: Self) -> Self;
-    /// Without its sign.
+    /// Absolute value.
     #[must_use]
     fn abs(self) -> Self;
     /// Square root.
@@ -53,7 +53,7 @@ pub trait Number:
     #[must_use]
     fn tanh(self) -> Self;
 
-    /// Whether it is neither infinite nor no number.
+    /// True if it is neither infinite nor NaN.
     fn is_finite(self) -> bool;
 
     /// Zero.

@@ -6,9 +6,9 @@ pub struct Branches<const B: usize>;
 
 /// Models with a number of branches: strain, rate, the branches and perhaps a baseline.
 pub trait Models {
-    /// With a baseline: `N = B + 3`.
+    /// Model with a baseline: `N = B + 3`.
     type WithBaseline<T: Scalar>;
-    /// Without: `N = B + 2`.
+    /// Model without a baseline: `N = B + 2`.
     type WithoutBaseline<T: Scalar>;
 }
 

@@ -9,7 +9,7 @@ use crate::{ModelNoise, Motion, Phase, Response, Scalar, SensorLaw, Symmetric};
 /// The state after a time step, given the state before it: `x' = mean + jacobian · (x - x̂) + noise`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Transition<T, const N: usize, const L: usize> {
-    /// Where the linearisation point x̂ goes.
+    /// Propagated mean, from the linearisation point x̂.
     pub mean: SVector<T, N>,
     /// ∂x'/∂x at x̂.
     pub jacobian: SMatrix<T, N, N>,
@@ -60,7 +60,7 @@ pub struct SwitchedModel<T, const B: usize, const N: usize> {
     noise: ModelNoise<T>,
 }
 
-/// What [`SwitchedModel::transition`] needs of the step's length: computed once where the step is fixed.
+/// Values that [`SwitchedModel::transition`] needs for a step's length: computed once if the step is fixed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SwitchedStep<T, const B: usize> {
     pub(crate) response: Response<T, B>,
@@ -78,7 +78,7 @@ impl<T: Scalar, const B: usize> SwitchedStep<T, B> {
         self.response.dt_s
     }
 
-    /// How motion and branches of unit gain answer.
+    /// Response of the motion and of branches of unit gain.
     #[must_use]
     pub const fn response(&self) -> &Response<T, B> {
         &self.response
@@ -140,7 +140,7 @@ impl<T: Scalar, const B: usize, const N: usize> SwitchedModel<T, B, N> {
         &self.motion
     }
 
-    /// What the law does not explain.
+    /// Noise: the part of the reading that the law does not explain.
     #[must_use]
     pub const fn noise(&self) -> &ModelNoise<T> {
         &self.noise
@@ -165,7 +165,7 @@ impl<T: Scalar, const B: usize, const N: usize> SwitchedModel<T, B, N> {
         (mean, variance)
     }
 
-    /// What a step of `dt_s ≥ 0` seconds does, whatever the state.
+    /// Prepares a step of `dt_s ≥ 0` seconds: all that does not depend on the state.
     #[must_use]
     pub fn prepare(&self, dt_s: T) -> SwitchedStep<T, B> {
         let growth = |sd: T, time_s: T| -(T::of(-2.0) * dt_s / time_s).exp_m1() * sd * sd;

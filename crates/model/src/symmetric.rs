@@ -129,7 +129,7 @@ impl<T: Scalar, const N: usize, const L: usize> Symmetric<T, N, L> {
         self
     }
 
-    /// Whether every entry is finite.
+    /// True if every entry is finite.
     #[must_use]
     pub fn is_finite(&self) -> bool {
         self.0.iter().all(|x| x.is_finite())

@@ -1,4 +1,4 @@
-//! What the sensor is, through the public interface. One test program; a module for each subject.
+//! Tests of the sensor's model through the public interface. One test program; a module for each subject.
 
 mod parts;
 mod response;

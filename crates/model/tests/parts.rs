@@ -84,7 +84,7 @@ proptest! {
     }
 }
 
-/// At mid-scale a 10-bit divider resolves 0.39 % of R, a 12-bit one 0.098 %.
+/// A 10-bit divider resolves 0.39 % of R at mid-scale, a 12-bit one 0.098 %.
 #[test]
 fn resolution_of_a_divider_at_mid_scale() {
     for (bits, percent) in [(10, 0.39), (12, 0.098)] {

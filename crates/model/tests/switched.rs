@@ -142,7 +142,7 @@ proptest! {
         }
     }
 
-    /// With constant gains and a given phase one step is two: exact in mean, Jacobian and noise.
+    /// One step is two, with constant gains and a given phase: exact in mean, Jacobian and noise.
     #[test]
     fn splitting_a_step_changes_nothing(state in state(), first in 0.001..2.0_f64, second in 0.001..2.0_f64) {
         let model = model::<f64>(polynomial(), 0.0);
@@ -222,7 +222,7 @@ fn an_uncertain_direction_drives_both_gains() {
     assert!((certain.mean - known.mean).amax() < 1e-15);
 }
 
-/// At rest a rate of deviation s leaves s² (1/4 - 1/(2π)) of the variance of its stretching half unexplained, from the moments
+/// A rate of deviation s at rest leaves s² (1/4 - 1/(2π)) of the variance of its stretching half unexplained, from the moments
 /// of the half-normal distribution: through the dash-pots in the reading, and through all gains in the branches, over the
 /// time for which each remembers.
 #[test]

@@ -17,7 +17,7 @@ fn an_infinite_range_is_refused() {
     assert!(law(STRAIGHT, -0.1, 0.3).validate().is_ok());
 }
 
-/// What passes has a finite value and slope at a thousand strains of the range.
+/// An accepted gauge has a finite value and slope at a thousand strains of the range.
 #[test]
 fn a_gauge_without_a_value_in_its_range_is_refused() {
     let tunnelling = |gap, barrier, path_loss| Gauge::Tunnelling { gap, barrier, path_loss };

@@ -10,14 +10,14 @@ use crate::known::in_order;
 use crate::stored::{MadeOf, StoredOptions};
 use crate::{Error, Filter, Known, LaggedFilter, Sensor, Stored, StoredError};
 
-/// How many readings in a row a gate turns down before it is the state that is doubted: outliers come alone, a body that sets off
-/// surprises until it is followed. With ten a knee that bent within half a second was missed.
+/// Number of readings in a row that a gate rejects before the state is doubted instead: outliers come alone, but a body that sets
+/// off surprises until it is followed. With ten, a knee that bent within half a second was missed.
 const PATIENCE: u32 = 2;
-/// What a surprising reading may do unless somebody says otherwise. On five public recordings of two materials it costs at most
+/// Default influence of a surprising reading. On five public recordings of two materials it costs at most
 /// one hundredth of the error where nothing is wrong (Student's t with four degrees of freedom costs a tenth on two of them).
 pub(crate) const INFLUENCE: Influence<f64> = Influence::Redescending { threshold: 3.0 };
 
-/// How a filter is to be; see [`Sensor::filter`]. Everything has a default.
+/// Options of a filter; see [`Sensor::filter`]. Everything has a default.
 ///
 /// ```
 /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -75,7 +75,7 @@ impl<'a> FilterBuilder<'a> {
         Self { estimator: Some(kind), ..self }
     }
 
-    /// Without the learned correction of the strain.
+    /// Turns off the learned correction of the strain.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -88,8 +88,9 @@ impl<'a> FilterBuilder<'a> {
         Self { corrects: false, ..self }
     }
 
-    /// What the rested, unstretched sensor reads now, in place of what it read in calibration: another day, or another
-    /// sensor of the same make; by no more than a factor of [`FARTHEST_REST`](crate::FARTHEST_REST). Where it is not told, R₀ follows readings that stay outside of the calibration's
+    /// Sets the present reading of the rested, unstretched sensor, in place of that in calibration: for another day, or another
+    /// sensor of the same make. It may differ by a factor of [`FARTHEST_REST`](crate::FARTHEST_REST) at most. Without
+    /// it, R₀ adapts to readings that stay outside the calibrated range
     /// ([`RestFollower`](ohmstrain_ekf::live::RestFollower)).
     ///
     /// ```
@@ -152,8 +153,8 @@ impl<'a> FilterBuilder<'a> {
         Self { gate: Some(nis), ..self }
     }
 
-    /// How surprising readings are taken: the less the farther beyond three standard deviations, unless said otherwise.
-    /// [`Influence::Full`] takes every one as it is.
+    /// Sets the influence of surprising readings. By default it decreases with the distance beyond three standard deviations;
+    /// [`Influence::Full`] takes every reading as it is.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -168,7 +169,7 @@ impl<'a> FilterBuilder<'a> {
         Self { influence, ..self }
     }
 
-    /// Every finite reading is one, whatever calibration has seen, and a number that comes again and again is not stuck.
+    /// Turns off the plausibility check: every finite reading is used, whatever the calibrated range, and no repeated number is stuck.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -185,7 +186,7 @@ impl<'a> FilterBuilder<'a> {
         Self { protections: Protections { plausibility: false, ..self.protections }, ..self }
     }
 
-    /// What was known before any reading is not followed again where readings have jumped. A smoother never does.
+    /// Turns off the second look after a jump of the readings, which follows the knowledge from before any reading. A smoother never has it.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -252,8 +253,8 @@ impl<'a> FilterBuilder<'a> {
         Ok(LaggedFilter::new(self.kernel(kind)?, lag_s))
     }
 
-    /// A filter that goes on from where another one of the same sensor and options was stored, to the bit. R₀ and strains that were
-    /// known are those of then; what is told here counts from now on.
+    /// Builds a filter that resumes where another one of the same sensor and options was stored, to the bit. R₀ and known strains
+    /// are those of the state; those given here count from now on.
     ///
     /// # Errors
     /// If the state is of another sensor, of other options or of another version, or an initial strain is given: the first row is over.
@@ -274,7 +275,7 @@ impl<'a> FilterBuilder<'a> {
         Ok(filter)
     }
 
-    /// The same of a filter with a lag.
+    /// Resumes a filter with a lag.
     ///
     /// # Errors
     /// As [`Self::resume`].
@@ -320,7 +321,7 @@ impl<'a> FilterBuilder<'a> {
         Ok(Kernel { filter, rows: RowWriter { scale, errors }, known, made_of })
     }
 
-    /// The scale of the rows, with R₀ as it is told.
+    /// Returns the scale of the rows, with R₀ as given.
     pub(crate) fn scale(self) -> Result<Scale, Error> {
         let mut scale = Scale::new(self.sensor)?;
         self.rest_resistance.map_or(Ok(()), |measured| scale.rest_at(measured))?;

@@ -28,7 +28,7 @@ pub fn calibrate(recordings: &[Recording]) -> Result<Sensor, Error> {
     Calibration::new().run(recordings).map(|calibrated| calibrated.sensor)
 }
 
-/// How to calibrate. Everything has a default.
+/// Options of a calibration. Everything has a default.
 ///
 /// ```
 /// use ohmstrain::{Calibration, EstimatorKind, Recording};
@@ -49,7 +49,7 @@ pub struct Calibration<'a> {
     gauge: Option<GaugeFamily>,
 }
 
-/// What comes of a calibration.
+/// Result of a calibration.
 ///
 /// ```
 /// fn remark(calibrated: &ohmstrain::Calibrated) {
@@ -63,18 +63,18 @@ pub struct Calibration<'a> {
 pub struct Calibrated {
     /// The sensor.
     pub sensor: Sensor,
-    /// What it is worth; `None` if that could not be told.
+    /// Measured quality of the sensor; `None` if it could not be measured.
     pub findings: Option<Findings>,
     /// R₀ of each recording, in the unit of its readings.
     pub rest_readings: Vec<f64>,
     /// Rows that were left out.
     pub distrusted: Vec<Distrusted>,
-    /// What was estimated in each quarter by what was fitted to the others, quarter by quarter; none if that could not be done.
+    /// Estimates on each quarter by a fit to the other quarters, in order; empty if that was not possible.
     pub left_out: Vec<LeftOutRow>,
 }
 
 impl<'a> Calibration<'a> {
-    /// With every choice left to the program.
+    /// Creates a calibration with every choice left to the program.
     ///
     /// ```
     /// let calibration = ohmstrain::Calibration::new();
@@ -118,8 +118,8 @@ impl<'a> Calibration<'a> {
         Self { gauge: Some(family), ..self }
     }
 
-    /// With what other sensors of the make have taught: a short motion is enough then. The law's structure is the prior's,
-    /// whatever [`Self::branches`] and [`Self::gauge`] say; the sensor's R₀ is its own.
+    /// Uses a prior learned from other sensors of the make: a short motion is enough then. The law's structure is the prior's,
+    /// whatever [`Self::branches`] and [`Self::gauge`] are; the sensor's R₀ is its own.
     ///
     /// ```
     /// use ohmstrain::{Calibration, Prior};
@@ -150,7 +150,7 @@ impl<'a> Calibration<'a> {
         self.run_with(recordings, |_| {})
     }
 
-    /// The same, telling `progress` what it is about.
+    /// Calibrates, calling `progress` with each stage.
     ///
     /// # Errors
     /// As [`calibrate`].

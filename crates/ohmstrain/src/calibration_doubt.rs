@@ -73,13 +73,13 @@ pub enum CalibrationDoubt {
     Frozen {
         /// The recording.
         recording: usize,
-        /// When it begins, s.
+        /// Start, s.
         from_s: f64,
-        /// When it ends, s.
+        /// End, s.
         to_s: f64,
-        /// What the reference says all that time.
+        /// Value of the reference during that time.
         reference: f64,
-        /// How far the readings go up and down meanwhile.
+        /// Range of the readings, up and down, during that time.
         swing: f64,
     },
     /// Strains that are negative, of a sensor that stretches.
@@ -102,18 +102,18 @@ pub enum CalibrationDoubt {
         recording: usize,
         /// Median step of the clock.
         step: f64,
-        /// How long a stroke takes by it, s.
+        /// Duration of a stroke by this clock, s.
         stroke_s: f64,
     },
     /// Intervals that the law is too wrong for.
     Widened {
-        /// Whose they are.
+        /// Name of what they are intervals of.
         of: &'static str,
     },
 }
 
 impl CalibrationDoubt {
-    /// Whether nothing is to be calibrated until it is answered; if not, it is a warning.
+    /// True if it must be answered before calibration; if false, it is a warning.
     ///
     /// ```
     /// assert!(ohmstrain::CalibrationDoubt::KiloOhm { recording: 0, median: 1.6 }.is_refusal());

@@ -19,7 +19,7 @@ pub struct Column {
     cell: Cell,
 }
 
-/// What stands in a column.
+/// Content of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Cell {
     Time,
@@ -44,7 +44,7 @@ pub(crate) enum Cell {
 }
 
 impl Cell {
-    /// In the order of the columns; the last two need a joint.
+    /// All cells in the order of the columns; the last two need a joint.
     const ALL: [Self; 19] = [
         Self::Time,
         Self::Reading,
@@ -82,7 +82,7 @@ impl Column {
         self.name
     }
 
-    /// Whether these are the names of all columns of the estimates of some sensor, in order.
+    /// True if these are the names of all columns of the estimates of some sensor, in order.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -97,7 +97,7 @@ impl Column {
         Header::ALL.into_iter().any(|header| names.clone().eq(header.columns().map(|column| column.name)))
     }
 
-    /// Whether it is the column of the flags, the only one without numbers.
+    /// True for the column of the flags, the only one without numbers.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -146,7 +146,7 @@ impl Column {
     }
 }
 
-/// What decides on the names of a sensor's columns.
+/// Properties of a sensor that determine the names of its columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Header {
     reading: ReadingUnit,
@@ -158,7 +158,7 @@ impl Header {
     pub(crate) const OHM_STRAIN: Self =
         Self { reading: ReadingUnit::Ohm, quantity: Quantity::Strain, has_joint: false };
 
-    /// Of every sensor there may be: one that is calibrated on an angle has no joint besides.
+    /// Headers of all possible sensors: one that is calibrated on an angle has no joint besides.
     const ALL: [Self; 6] = {
         let strain = Self::OHM_STRAIN;
         let angle = Self { quantity: Quantity::AngleDeg, ..strain };
@@ -178,7 +178,7 @@ impl Header {
         Self { reading: params.reading, quantity: params.quantity, has_joint: params.joint.is_some() }
     }
 
-    /// How many columns there are.
+    /// Returns the number of columns.
     pub(crate) const fn len(self) -> usize {
         if self.has_joint { Cell::ALL.len() } else { Cell::ALL.len() - 2 }
     }

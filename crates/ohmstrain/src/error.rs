@@ -11,7 +11,7 @@ use thiserror::Error;
 use crate::number::{plain, significant};
 use crate::{ReferenceDoubt, StoredError, UnitDoubt};
 
-/// Why there is no sensor, no filter or no estimate.
+/// Reason for having no sensor, no filter or no estimate.
 ///
 /// ```
 /// let error = ohmstrain::Sensor::from_toml("format = 3").unwrap_err();
@@ -42,23 +42,23 @@ pub enum Error {
     /// A strain to start at, or that is known later, that the sensor never reports.
     #[error("{name}: expected {} to {}, the limits of the sensor's {}, found {found}", plain(*lower), plain(*upper), quantity.name())]
     KnownStrain {
-        /// What it is.
+        /// Name of the number.
         name: &'static str,
-        /// What is estimated.
+        /// Quantity that is estimated.
         quantity: Quantity,
         /// Lower limit.
         lower: f64,
         /// Upper limit.
         upper: f64,
-        /// What was given.
+        /// Value that was given.
         found: f64,
     },
     /// A resistance at rest, or a lag, that is not a positive number.
     #[error("{name}: expected a positive number, found {found}")]
     NotPositive {
-        /// What it is.
+        /// Name of the number.
         name: &'static str,
-        /// What was given.
+        /// Value that was given.
         found: f64,
     },
     /// A resistance at rest that is none of the sensor's: in another unit, or of another sensor.
@@ -71,9 +71,9 @@ pub enum Error {
         significant(*found, 5)
     )]
     FarRest {
-        /// What the rested sensor read in calibration.
+        /// Reading of the rested sensor in calibration.
         rested: f64,
-        /// What was given.
+        /// Value that was given.
         found: f64,
     },
     /// Recordings of different quantities, strain and angle, or units, ohms and ratios; or others than the calibration's.
@@ -82,9 +82,9 @@ pub enum Error {
     /// A prior of another quantity than the recordings', strain or angle.
     #[error("the prior is of {}, the recordings are of {}", of_make.name(), found.name())]
     OtherMake {
-        /// What the prior's sensors estimate.
+        /// Quantity of the prior's sensors.
         of_make: Quantity,
-        /// What the recordings' reference is.
+        /// Quantity of the recordings' reference.
         found: Quantity,
     },
     /// Slices of different lengths.
@@ -111,12 +111,12 @@ pub enum Error {
     /// The filter does not take a row. It stays as it was: the next good row goes on from the last good one.
     #[error(transparent)]
     Step(#[from] StepError),
-    /// The same, of a row of a recording, counted from zero.
+    /// Refused step at a row of a recording, counted from zero.
     #[error("row {row}: {source}")]
     Row {
         /// The row.
         row: usize,
-        /// What is wrong with it.
+        /// Error of the step.
         source: StepError,
     },
 }
@@ -140,7 +140,7 @@ impl Error {
     }
 }
 
-/// What is wrong with the text of a sensor, and where.
+/// Error in the text of a sensor, with its place.
 ///
 /// ```
 /// use ohmstrain::{Error, Sensor, TextCause};
@@ -151,9 +151,9 @@ impl Error {
 /// ```
 #[derive(Debug)]
 pub struct TextError {
-    /// Where; `None` if something is missing as a whole.
+    /// Place in the text; `None` if something is missing as a whole.
     pub place: Option<Place>,
-    /// What.
+    /// Cause of the error.
     pub cause: TextCause,
 }
 
@@ -172,7 +172,7 @@ impl std::error::Error for TextError {
     }
 }
 
-/// What is wrong with the text of a sensor; see [`TextError`].
+/// Cause of an error in the text of a sensor; see [`TextError`].
 ///
 /// ```
 /// use std::error::Error;
@@ -184,15 +184,15 @@ impl std::error::Error for TextError {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum TextCause {
-    /// It is no TOML, or a field is unknown, missing or of the wrong type.
+    /// Invalid TOML, or a field that is unknown, missing or of the wrong type.
     #[error("{}", .0.message().replace('\n', ", "))]
     Toml(#[source] toml::de::Error),
-    /// It is of another version of the format.
+    /// Text in another version of the format.
     #[error("field `format`: expected version {expected}, found {found}")]
     Format {
         /// The version that is read.
         expected: u32,
-        /// That version.
+        /// Version of the text.
         found: u32,
     },
     /// A number that no sensor can have.

@@ -8,10 +8,10 @@ use serde::{Serialize, Serializer};
 use crate::column::Header;
 use crate::{Error, Flag, Flags, Reading, Sensor};
 
-/// What is known at one row: the row of `estimates.csv`, a field per column. Serialised, it has the names of that file's
-/// header, which tell the unit; what is not known is nothing.
+/// Estimate at one row: the row of `estimates.csv`, a field per column. Serialised, it has the names of that file's
+/// header, which tell the unit; an unknown value is nothing.
 ///
-/// Of a sensor that was calibrated in degrees the four fields of strain are degrees and degrees per second.
+/// For a sensor that was calibrated in degrees, the four fields of strain are degrees and degrees per second.
 ///
 /// ```
 /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -41,9 +41,9 @@ pub struct Estimate {
     pub relaxation_sd: f64,
     /// Slow drift and error of the law, relative to R₀.
     pub baseline: f64,
-    /// What will be read, in the sensor's unit, if the strain is held from now on for as long as in the longest hold of the
-    /// calibration (a minute, if it has seen none): a reading that was taken, or what the sensor would read, less what the law
-    /// says will relax, as far as that has come true in calibration.
+    /// Predicted reading, in the sensor's unit, if the strain is held from now on for as long as in the longest hold of the
+    /// calibration (a minute, if it has seen none). It is the reading that was taken, or the sensor's expected one, minus the law's
+    /// relaxation, as far as that has come true in calibration.
     pub settled_resistance: f64,
     /// Its standard deviation.
     pub settled_resistance_sd: f64,
@@ -57,7 +57,7 @@ pub struct Estimate {
     pub p_beyond_border: f64,
     /// Squared innovation of the reading over its variance; `None` without a reading.
     pub nis: Option<f64>,
-    /// What else there is to say.
+    /// Flags.
     pub flags: Flags,
     /// Angle of the joint, degrees; `None` without a joint.
     pub angle_deg: Option<f64>,
@@ -95,7 +95,7 @@ impl Default for Estimate {
     }
 }
 
-/// With the names of `estimates.csv`.
+/// Serialisation with the names of `estimates.csv`.
 impl Serialize for Estimate {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut row = serializer.serialize_struct("Estimate", self.header.len())?;
@@ -111,7 +111,7 @@ impl Serialize for Estimate {
     }
 }
 
-/// What leads from readings to the kernel and from there to rows.
+/// Conversion from readings to the kernel and from there to rows.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scale {
     /// R₀ in the unit of the readings.
@@ -142,7 +142,7 @@ impl Scale {
         Ok(())
     }
 
-    /// How far the limits of the strain are apart.
+    /// Returns the span of the strain's limits.
     pub(crate) const fn span(&self) -> f64 {
         self.limits.1 - self.limits.0
     }
@@ -164,7 +164,7 @@ impl Scale {
         Ok(Gaussian { mean: strain, variance: sd * sd })
     }
 
-    /// The row of a reading and what the filter says of it.
+    /// Returns the row of a reading and the filter's output.
     pub(crate) fn row(&self, time_s: f64, reading: Reading, output: &Output) -> Estimate {
         let rest_reading = self.rest_reading * (1.0 + output.rest_off);
         let estimate = &output.estimate;
@@ -223,7 +223,7 @@ pub(crate) fn check_rest(rested: f64, measured: f64) -> Result<(), Error> {
     Err(Error::FarRest { rested, found: measured })
 }
 
-/// Whether the row's reading was weighed down for standing far from what was expected.
+/// True if the row's reading was downweighted because it was far from the expected one.
 fn surprises(output: &Output) -> bool {
     output.verdict == ReadingVerdict::Downweighted && output.nis.is_none_or(|nis| nis > SURPRISING_NIS)
 }

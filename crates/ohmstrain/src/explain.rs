@@ -25,7 +25,7 @@ impl Recording<'_> {
     }
 }
 
-/// What recordings tell of the parameters of the law that was fitted to them, what they leave open, and what to record next.
+/// Reports which parameters of the fitted law the recordings determine, which they leave open, and what to record next.
 ///
 /// # Errors
 /// If the recordings are too short, or the strain is constant.

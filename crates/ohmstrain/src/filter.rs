@@ -15,25 +15,25 @@ pub(crate) struct Kernel {
     pub rows: RowWriter,
     /// Strains that will be known, in order of time.
     pub known: VecDeque<(f64, Gaussian<f64>)>,
-    /// What it was made of.
+    /// Sensor and options that it was made of.
     pub made_of: MadeOf,
 }
 
-/// From what a filter says to rows.
+/// Conversion of a filter's output to rows.
 pub(crate) struct RowWriter {
     pub scale: Scale,
-    /// What known strains say of other rows.
+    /// Errors at known strains, applied to other rows.
     pub errors: KnownErrors,
 }
 
 impl RowWriter {
-    /// The row of a reading and what the filter says of it.
+    /// Returns the row of a reading and the filter's output.
     fn row(&mut self, row: (f64, Reading), output: &Output) -> Estimate {
         self.errors.restate(row.0, output.estimate.strain);
         self.known_row(row, output)
     }
 
-    /// The row of what is said, with what is known of its error.
+    /// Returns the row of an output, corrected by known errors.
     fn known_row(&self, (time_s, reading): (f64, Reading), said: &Output) -> Estimate {
         let mut output = *said;
         output.estimate.strain = self.errors.correct(time_s, said.estimate.strain);
@@ -42,7 +42,7 @@ impl RowWriter {
 }
 
 impl Kernel {
-    /// R₀ is told: nothing follows any more.
+    /// Sets R₀, which no longer follows the readings.
     fn rest_resistance(&mut self, measured: f64) -> Result<(), Error> {
         self.rows.scale.rest_at(measured)?;
         self.filter.rest(measured).map_err(Error::Step)?;
@@ -60,7 +60,7 @@ impl Kernel {
         })
     }
 
-    /// Goes on from what was stored; strains that will be known are those of both.
+    /// Resumes from a stored state; known strains of both are kept.
     fn resume(&mut self, stored: StoredKernel) -> Result<(), Error> {
         let StoredKernel { rest_reading, known, told, filter } = stored;
         self.filter.resume(filter).map_err(|error| StoredError::Content(Box::new(error)))?;
@@ -71,7 +71,7 @@ impl Kernel {
         Ok(())
     }
 
-    /// A strain is known, of which something was said.
+    /// Takes a known strain, with the estimate at that time.
     fn know(&mut self, strain: KnownStrain) {
         self.rows.errors.tell(strain);
         self.filter.settle();
@@ -90,7 +90,7 @@ impl Kernel {
 /// ```
 pub struct Filter {
     kernel: Kernel,
-    /// Time and reading of the last row, and what was said of it before known strains.
+    /// Time and reading of the last row, and its output before known strains.
     last: Option<(f64, Reading, Output)>,
 }
 
@@ -129,9 +129,9 @@ impl Filter {
         Ok(row)
     }
 
-    /// Takes in that the strain (or angle) is known now, to `sd`: the estimate of the last row, or of the first one if there is
-    /// none yet, and those after it follow. What the error was then counts for seconds, and for an hour as far as more than one known
-    /// strain, or one that is far from what was said, show an offset or another gain.
+    /// Takes a known strain (or angle), as of now, to `sd`: the estimate of the last row, or of the first one if there is
+    /// none yet, and those after it follow. The error at that time counts for seconds, and for an hour as far as more than one known
+    /// strain, or one that is far from the estimate, shows an offset or another gain.
     ///
     /// # Errors
     /// If the strain lies beyond the limits by more than a tenth of them, or `sd` is not positive. The filter stays as it was.
@@ -156,7 +156,7 @@ impl Filter {
         Ok(kernel.rows.known_row((time_s, reading), &said))
     }
 
-    /// All that the next row depends on: [`FilterBuilder::resume`](crate::FilterBuilder::resume) goes on from it, to the bit.
+    /// Stores all that the next row depends on: [`FilterBuilder::resume`](crate::FilterBuilder::resume) resumes from it, to the bit.
     ///
     /// # Errors
     /// If TOML cannot hold it.
@@ -185,7 +185,7 @@ impl Filter {
         Ok(())
     }
 
-    /// What the rested, unstretched sensor is found to read from now on, in place of what it read in calibration.
+    /// Sets the reading of the rested, unstretched sensor from now on, in place of that in calibration.
     ///
     /// # Errors
     /// If it is not a positive number, or farther from the calibration's than by a factor of
@@ -224,11 +224,11 @@ pub struct LaggedFilter {
     lag_s: f64,
     /// Time of the last row, s.
     last_s: Option<f64>,
-    /// RowWriter whose estimates wait for later readings.
+    /// Rows whose estimates wait for later readings.
     waiting: VecDeque<(f64, Reading)>,
     /// Estimates that have become due.
     due: Vec<Estimate>,
-    /// Whether they have been handed out.
+    /// True if they have been handed out.
     are_out: bool,
 }
 
@@ -240,7 +240,7 @@ impl LaggedFilter {
     /// Takes the reading at `time_s`, as [`Filter::step`] does, and hands out the rows that have become due, in order.
     ///
     /// # Errors
-    /// As [`Filter::step`]. RowWriter that have become due meanwhile are handed out with the next step.
+    /// As [`Filter::step`]. Rows that have become due meanwhile are handed out with the next step.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -293,7 +293,7 @@ impl LaggedFilter {
         Ok(&self.due)
     }
 
-    /// As [`Filter::know`], for rows that are still to be handed out and those to come.
+    /// Sets the strain as [`Filter::know`] does, for rows that are still to be handed out and those to come.
     ///
     /// # Errors
     /// As [`Filter::know`].
@@ -316,8 +316,8 @@ impl LaggedFilter {
         Ok(())
     }
 
-    /// As [`Filter::store`], with the rows that wait: [`FilterBuilder::resume_lagged`](crate::FilterBuilder::resume_lagged) goes on
-    /// from it.
+    /// Stores the filter as [`Filter::store`] does, with the rows that wait. [`FilterBuilder::resume_lagged`](crate::FilterBuilder::resume_lagged)
+    /// resumes from it.
     ///
     /// # Errors
     /// If TOML cannot hold it, or rows that have become due are still to be handed out, as after an error: take another row first.
@@ -349,7 +349,7 @@ impl LaggedFilter {
         Ok(())
     }
 
-    /// Takes in what is known by the last row. RowWriter are handed out as soon as they are due: it is after them.
+    /// Takes in what is known by the last row. Rows are handed out as soon as they are due: it is after them.
     fn take_known(&mut self) {
         let Some(time_s) = self.last_s else { return };
         while let Some(known) = next_until(&mut self.kernel.known, time_s) {
@@ -358,7 +358,7 @@ impl LaggedFilter {
         }
     }
 
-    /// As [`Filter::rest_resistance`].
+    /// Sets the reading of the rested sensor, see [`Filter::rest_resistance`].
     ///
     /// # Errors
     /// If it is not a positive number, or farther from the calibration's than by a factor of

@@ -7,7 +7,7 @@ use ohmstrain_sensor::{KnownErrors, KnownStrain, MOST_KNOWN};
 use crate::Error;
 use crate::estimate::Scale;
 
-/// How well a known strain is known unless it says so, in spans of the limits.
+/// Default standard deviation of a known strain, in spans of the limits.
 const KNOWN_TO: f64 = 0.005;
 
 /// A strain (or angle) that is known at a time: a stop, a mark on the bench, a joint that is seen.
@@ -20,7 +20,7 @@ const KNOWN_TO: f64 = 0.005;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Known {
-    /// When, s: it is the strain of the first row from then on.
+    /// Time, s: it is the strain of the first row from then on.
     pub time_s: f64,
     /// The strain, or the angle in degrees.
     pub strain: f64,
@@ -57,11 +57,11 @@ pub(crate) fn next_until(known: &mut VecDeque<(f64, Gaussian<f64>)>, time_s: f64
     known.front().is_some_and(|known| known.0 <= time_s).then(|| known.pop_front()).flatten().map(|known| known.1)
 }
 
-/// What the known strains of a recording say of all its rows: of each the ones that are nearest on both sides.
+/// Errors at the known strains of a recording, applied to all its rows: each row uses the nearest ones on both sides.
 pub(crate) struct KnownOfAll {
     limits: StrainRange<f64>,
     strains: Vec<KnownStrain>,
-    /// How many were known by the row that was asked for last, and what those around it say.
+    /// Number of strains known by the row that was asked for last, and the errors at those around it.
     around: Option<(usize, KnownErrors)>,
 }
 

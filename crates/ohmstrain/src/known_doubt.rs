@@ -19,7 +19,7 @@ pub struct StartDoubt {
 impl std::error::Error for StartDoubt {}
 
 impl Sensor {
-    /// Asks whether the sensor ever reports a strain to start at. One a little beyond the limits is taken nevertheless.
+    /// Checks that the sensor can report a strain to start at. One a little beyond the limits is accepted.
     ///
     /// # Errors
     /// If it is outside of the sensor's limits.

@@ -11,12 +11,12 @@ use crate::Recording;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum LagDoubt {
-    /// As late as lags are looked for, or later: it cannot be moved.
+    /// Lag at the end of the searched range, or beyond: the reference cannot be moved.
     OutOfReach {
-        /// How far lags are looked for, s; negative if the reference is early.
+        /// Largest lag searched for, s; negative if the reference is early.
         lag_s: f64,
     },
-    /// Not on time, but two lags fit alike, since the motion repeats: it cannot be moved.
+    /// Two lags that fit alike, neither of them zero, since the motion repeats: the reference cannot be moved.
     Repeats {
         /// The two lags, s, the better one first.
         lags_s: [f64; 2],
@@ -30,7 +30,7 @@ pub enum LagDoubt {
 }
 
 impl LagDoubt {
-    /// How late the reference is, where that is known.
+    /// Returns the reference's lag, if it is known.
     ///
     /// ```
     /// assert_eq!(ohmstrain::LagDoubt::OutOfReach { lag_s: 12.0 }.lag(), None);
@@ -45,7 +45,7 @@ impl LagDoubt {
 }
 
 impl Recording<'_> {
-    /// Asks whether the reference is on the clock of the readings; `None` if it is, as far as the readings tell.
+    /// Checks that the reference is on the clock of the readings; returns `None` if it is, as far as the readings tell.
     ///
     /// ```
     /// let recording = ohmstrain::Recording::new(&[0.0, 0.1], &[1600.0, 1610.0], &[0.00, 0.01])?;

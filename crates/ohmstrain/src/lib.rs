@@ -1,7 +1,7 @@
-//! From the resistance of a soft, stretchable strain sensor to strain, with an honest error bar.
+//! Estimation of strain, with an honest error bar, from the resistance of a soft, stretchable strain sensor.
 //!
-//! A [`Sensor`] is what a calibration knows: read from a `sensor.toml`, or made by [`calibrate`] of recordings with known
-//! strain. It makes a [`Filter`] for readings as they come, and smooths whole recordings; both say what they know in rows
+//! A [`Sensor`] holds the result of a calibration: read from a `sensor.toml`, or made by [`calibrate`] from recordings with known
+//! strain. It makes a [`Filter`] for readings as they come, and smooths whole recordings; both give rows
 //! of plain numbers, [`Estimate`].
 //!
 //! ```
@@ -17,10 +17,10 @@
 //! ```
 //!
 //! # Policy
-//! - Knows slices and rows, not files. Readings are in the unit of the calibration, Ω or a ratio; strains are fractions.
-//! - What is read is checked: version, fields and the range of every number of a sensor, the unit of a recording.
-//! - An error leaves a filter as it was. A missing reading is none: NaN, `None`.
-//! - Deterministic: nothing is random but with a seed, no clock is read.
+//! - The library works on slices and rows, not files. Readings are in the unit of the calibration, Ω or a ratio; strains are fractions.
+//! - All input is checked: version, fields and the range of every number of a sensor, the unit of a recording.
+//! - An error leaves a filter as it was. A missing reading is NaN or `None`.
+//! - Results are deterministic: nothing is random without a seed, no clock is read.
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

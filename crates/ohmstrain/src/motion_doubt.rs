@@ -7,12 +7,12 @@ use crate::calibration_doubt::CalibrationDoubt;
 use crate::recording::Recording;
 use crate::unit_doubt::quantile;
 
-/// A reference that says one number for so long, s, in so many rows, may be frozen.
+/// Time, s, and number of rows after which a constant reference may be frozen.
 const FROZEN_S: f64 = 5.0;
 const FROZEN_ROWS: usize = 40;
 /// Readings of a body at rest relax in one direction, but for how they begin: this share of a still part is passed over.
 const BEGINS: f64 = 0.2;
-/// In the rest of it they move by more than this share of their range, up and down, only if the body does.
+/// Share of their range by which readings move up and down, in the rest of a still part, only if the body moves.
 const SWING: f64 = 0.3;
 /// Rows whose median counts as one: a spike is no swing.
 const GROUP: usize = 5;
@@ -129,7 +129,7 @@ fn correlation(rows: &[[f64; 3]]) -> f64 {
     sum(1, 2) / (sum(1, 1) * sum(2, 2)).sqrt()
 }
 
-/// How far readings move both up and down, behind how a still part begins.
+/// Returns the range of the readings' movement both up and down, without the beginning of a still part.
 fn swing(part: &[[f64; 3]]) -> f64 {
     let rest = &part[(BEGINS * part.len() as f64) as usize..];
     let medians = rest.chunks_exact(GROUP).filter_map(|group| quantile(group.iter().map(|row| row[1]), 0.5));

@@ -13,13 +13,13 @@ const UNIT_RATIO: f64 = 20.0;
 const REST_RATIO: f64 = 1.3;
 const GAUGE_RATIO: f64 = 3.0;
 
-/// Strains beyond this are taken for percent until somebody says that they are none: four times its own length.
+/// Largest strain that is not taken for percent, unless the unit is known: four times the sensor's own length.
 const LARGEST_STRAIN: f64 = 3.0;
 /// Above a strain of one, readings that change by less than this per strain are taken for it, too.
 const LEAST_GAUGE: f64 = 0.05;
 
-/// What the recordings of one calibration say about their units, and about being of one sensor: what is to be answered first,
-/// then what is to be known. Units that [are known](Recording::strain_unit_is_known) are not asked about.
+/// Returns doubts about the recordings of one calibration: about their units, and about being of one sensor. Refusals come first,
+/// then warnings. Units that [are known](Recording::strain_unit_is_known) are not doubted.
 ///
 /// ```
 /// use ohmstrain::{CalibrationDoubt, Recording, calibration_doubts};
@@ -134,7 +134,7 @@ impl Figures {
 }
 
 impl Calibrated {
-    /// What is to be known of the result: R₀ that differ between recordings, and intervals that the law is too wrong for.
+    /// Returns warnings about the result: R₀ that differ between recordings, and intervals that the law is too wrong for.
     ///
     /// ```
     /// fn warn(calibrated: &ohmstrain::Calibrated) {

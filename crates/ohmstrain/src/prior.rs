@@ -3,7 +3,7 @@ use ohmstrain_sensor::SensorParams;
 
 use crate::{Error, MADE_BY, Sensor, text};
 
-/// What calibrated sensors of one make have in common: with it a short motion calibrates the next one, see
+/// Common properties of calibrated sensors of one make: with them a short motion calibrates the next one, see
 /// [`Calibration::prior`](crate::Calibration::prior).
 ///
 /// ```no_run

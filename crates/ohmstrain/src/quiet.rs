@@ -2,22 +2,22 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Estimate, KNOWN_BEYOND, Known, Sensor};
 
-/// For how long readings must be quiet before somebody is asked, s.
+/// Time for which readings must be quiet before a question is asked, s.
 const QUIET_S: f64 = 30.0;
-/// How far apart quiet readings are, in ranges of the calibration's readings.
+/// Range of quiet readings, in ranges of the calibration's readings.
 const BAND: f64 = 0.02;
-/// How near they are to what the rested sensor read, or to the end of this run's readings on that side, in the same ranges.
+/// Largest distance of quiet readings from the rested sensor's reading, or from the end of this run's readings on that side, in the same ranges.
 const NEAR: f64 = 0.1;
-/// How far readings must have gone for that end to be one, and how far they go from a hold before somebody is asked of another.
+/// Distance that readings must have gone for that end to be one, and that they go from a hold before the next question.
 const AWAY: f64 = 0.3;
-/// How far from none the strain must be said to be for a question to be worth it, in spans of the limits.
+/// Smallest estimated strain, in either direction, that is worth a question, in spans of the limits.
 const WORTH: f64 = 0.02;
 /// No reading for so long ends a quiet hold, s.
 const PAUSE_S: f64 = 5.0;
 /// Questions in a run, at most.
 const MOST: usize = 3;
 
-/// Watches for long holds that may be rests: what the strain is then somebody may know.
+/// Watch for long holds that may be rests, whose strain the user may know.
 ///
 /// ```
 /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -30,7 +30,7 @@ const MOST: usize = 3;
 /// ```
 #[derive(Clone, Debug)]
 pub struct QuietWatch {
-    /// What the rested sensor reads.
+    /// Reading of the rested sensor.
     rested: f64,
     /// Range of the calibration's readings.
     range: f64,
@@ -65,15 +65,15 @@ struct Hold {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quiet {
-    /// When it began, s.
+    /// Start of the hold, s.
     pub from_s: f64,
-    /// The row at which somebody is asked, s.
+    /// Time of the row at which the question is asked, s.
     pub now_s: f64,
-    /// What the strain is said to be.
+    /// Estimated strain.
     pub strain: f64,
 }
 
-/// What a [`QuietWatch`] has seen so far, to go on from.
+/// State of a [`QuietWatch`], to resume from.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct QuietSeen {
@@ -84,7 +84,7 @@ pub struct QuietSeen {
 }
 
 impl QuietWatch {
-    /// What it has seen so far.
+    /// Returns the state so far.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -100,12 +100,12 @@ impl QuietWatch {
         QuietSeen { ends: self.ends, hold: self.hold, asked: self.asked, asked_at: self.asked_at }
     }
 
-    /// Goes on from what another one of the same sensor has seen.
+    /// Resumes from the state of another watch of the same sensor.
     pub fn go_on(&mut self, seen: QuietSeen) {
         (self.ends, self.hold, self.asked, self.asked_at) = (seen.ends, seen.hold, seen.asked, seen.asked_at);
     }
 
-    /// For a sensor that reads `rest_resistance` at rest, if that is not what it read in calibration, and strains that are
+    /// Creates a watch for a sensor that reads `rest_resistance` at rest, if that differs from calibration, and for strains that are
     /// known anyway.
     ///
     /// ```
@@ -165,7 +165,7 @@ impl QuietWatch {
 }
 
 impl Hold {
-    /// With another reading; none if that one is not quiet.
+    /// Extends the hold by another reading; `None` if that one is not quiet.
     fn with(self, time_s: f64, reading: f64, band: f64) -> Option<Self> {
         let (low, high) = (self.low.min(reading), self.high.max(reading));
         let is_quiet = high - low <= band && time_s - self.last_s <= PAUSE_S;
@@ -181,7 +181,7 @@ mod tests {
         Sensor::from_toml(include_str!("../examples/sensor.toml")).unwrap()
     }
 
-    /// What is asked of readings every 0.1 s, of which the strain is said to be `strain`.
+    /// Returns the questions asked for readings every 0.1 s, whose estimated strain is `strain`.
     fn asked(known: &[Known], strain: f64, reading: impl Fn(u32) -> f64) -> Vec<Quiet> {
         let sensor = sensor();
         let mut watch = QuietWatch::new(&sensor, None, known);

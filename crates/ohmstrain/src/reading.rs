@@ -9,11 +9,11 @@
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Reading {
-    /// As recorded; NaN where it is missing.
+    /// Value as recorded; NaN if it is missing.
     pub value: f64,
     /// Standard deviation that the electronics add to the sensor's own, in the same unit; 0 if unknown.
     pub sd: f64,
-    /// Whether a converter stood at an end of its scale, so that there is no value.
+    /// True if a converter stood at an end of its scale, so that there is no value.
     pub saturated: bool,
 }
 

@@ -72,7 +72,7 @@ impl<'a> Recording<'a> {
         Self { quantity: Quantity::AngleDeg, ..self }
     }
 
-    /// Somebody has said that the strains are fractions: [`calibration_doubts`](crate::calibration_doubts) does not ask.
+    /// States that the strains are fractions: [`calibration_doubts`](crate::calibration_doubts) does not ask.
     ///
     /// ```
     /// let balloon = ohmstrain::Recording::new(&[0.0, 0.1], &[1600.0, 9000.0], &[0.0, 4.5])?.strain_unit_is_known();
@@ -84,7 +84,7 @@ impl<'a> Recording<'a> {
         Self { knows_strain_unit: true, ..self }
     }
 
-    /// Somebody has said that the clock counts seconds: [`motion_doubts`](crate::motion_doubts) does not ask.
+    /// States that the clock counts seconds: [`motion_doubts`](crate::motion_doubts) does not ask.
     ///
     /// ```
     /// let slow = ohmstrain::Recording::new(&[0.0, 60.0], &[1600.0, 1610.0], &[0.00, 0.01])?.clock_is_known();
@@ -96,7 +96,7 @@ impl<'a> Recording<'a> {
         Self { knows_clock: true, ..self }
     }
 
-    /// Somebody has said that the readings are in Ω, or electronics tell it.
+    /// States that the readings are in Ω, as electronics also do.
     ///
     /// ```
     /// let small = ohmstrain::Recording::new(&[0.0, 0.1], &[1.6, 1.7], &[0.0, 0.1])?.resistance_unit_is_known();
@@ -135,7 +135,7 @@ impl<'a> Recording<'a> {
     }
 }
 
-/// How good a sensor's estimates are on a recording; see [`Sensor::evaluate`].
+/// Scores of a sensor's estimates on a recording; see [`Sensor::evaluate`].
 ///
 /// ```
 /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -153,7 +153,7 @@ pub struct Evaluation {
     pub filter: Scores,
     /// The smoother's.
     pub smoother: Scores,
-    /// Those of strain as a cubic polynomial of the reading.
+    /// Scores of strain as a cubic polynomial of the reading.
     pub static_cubic: Scores,
 }
 

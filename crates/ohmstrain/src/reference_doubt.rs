@@ -26,14 +26,14 @@ pub struct ReferenceDoubt {
     pub expected: f64,
     /// 95th percentile of the reference's magnitude.
     pub found: f64,
-    /// Whether it is the calibration that seems to be in percent.
+    /// True if the calibration seems to be in percent, not the recording.
     pub is_of_calibration: bool,
 }
 
 impl std::error::Error for ReferenceDoubt {}
 
 impl Sensor {
-    /// Asks whether a reference is in the calibration's unit: fractions, not percent. Angles are not asked about.
+    /// Checks that a reference is in the calibration's unit: fractions, not percent. Angles are not checked.
     ///
     /// # Errors
     /// If it is a hundred times too large, or too small.

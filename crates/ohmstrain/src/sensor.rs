@@ -24,7 +24,7 @@ use crate::{Column, Error, Estimate, FilterBuilder, UnitDoubt};
 pub struct Sensor {
     /// Shared with its filters.
     params: Arc<SensorParams>,
-    /// For all its filters; `None` without a correction.
+    /// Learned correction, shared by all its filters; `None` without a correction.
     learned: Option<Arc<Learned>>,
 }
 
@@ -52,7 +52,7 @@ impl Sensor {
         Self::from_params(text::parse(text)?)
     }
 
-    /// The same for use with one estimator, whatever the text's default is.
+    /// Reads a sensor for use with one estimator, whatever the text's default is.
     ///
     /// # Errors
     /// As [`Self::from_toml`], for that estimator.
@@ -142,7 +142,7 @@ impl Sensor {
         &self.params
     }
 
-    /// The same, given away.
+    /// Returns the parameters, and consumes the sensor.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -195,7 +195,7 @@ impl Sensor {
         Ok(self)
     }
 
-    /// Asks whether the rested sensor can read `measured`.
+    /// Checks that the rested sensor can read `measured`.
     ///
     /// # Errors
     /// If it is not positive, or farther from what the rested sensor read in calibration than by a factor of
@@ -268,8 +268,8 @@ impl Sensor {
         Header::of(&self.params).columns().collect()
     }
 
-    /// Asks whether readings are in the calibration's unit, by their median. `rest_resistance` is what the rested sensor
-    /// reads now, if it is not what it read in calibration.
+    /// Checks that readings are in the calibration's unit, by their median. `rest_resistance` is the present reading of the rested
+    /// sensor, if it differs from that in calibration.
     ///
     /// # Errors
     /// If they are far from those of the calibration, and would not be in another unit.

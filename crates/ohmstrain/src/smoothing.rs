@@ -69,7 +69,7 @@ impl FilterBuilder<'_> {
         self.smooth_with(len, row, |_, time_s, said| known.correct(time_s, said), take)
     }
 
-    /// What known strains say of all rows of a recording, which is smoothed once for what is said where they are known.
+    /// Computes the errors at known strains for all rows of a recording. The recording is smoothed once for the estimates there.
     fn known_of_all(self, len: usize, row: &impl Fn(usize) -> (f64, Reading)) -> Result<KnownOfAll, Error> {
         let scale = Scale::new(self.sensor)?;
         let mut due = in_order(self.known, &scale)?;
@@ -93,7 +93,7 @@ impl FilterBuilder<'_> {
         Ok(KnownOfAll::new(scale.limits(), known.into_iter().map(|known| known.1).collect()))
     }
 
-    /// Smooths; `known` is shown row, time, s, and what is said of its strain, and says what is known of that.
+    /// Smooths; `known` gets row, time, s, and estimated strain, and returns the strain corrected by known ones.
     fn smooth_with<E: From<Error>>(
         self,
         len: usize,

@@ -16,7 +16,7 @@ const FORMAT: u32 = 1;
 
 /// A running filter between two rows: the content of a state file. [`Filter::store`](crate::Filter::store) makes it.
 ///
-/// It says of which sensor, options and version it is, and goes on with those alone.
+/// It names its sensor, options and version, and resumes with those alone.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stored {
@@ -26,15 +26,15 @@ pub struct Stored {
     sensor: String,
     options: StoredOptions,
     lag_s: Option<f64>,
-    /// What the rested sensor was said to read, for what stands around the filter.
+    /// Reading of the rested sensor as given by the user, for the program around the filter.
     pub rest_resistance: Option<f64>,
     /// The clock of the stream that was read, for what stands around the filter.
     pub clock: Option<StoredClock>,
     /// The moment that is 0 s, ns since 1970, of a table of dates and times.
     pub zero_ns: Option<i64>,
-    /// What has been seen of the calibration's reach.
+    /// State of the watch for use outside the calibrated range.
     pub validity: Option<ValiditySeen>,
-    /// What has been seen of long holds.
+    /// State of the watch for long holds.
     pub quiet: Option<QuietSeen>,
     /// Time of the last row of a filter with a lag, s.
     pub(crate) last_s: Option<f64>,
@@ -52,34 +52,34 @@ pub enum StoredClock {
     TimeS(f64),
     /// Microseconds.
     TimeUs {
-        /// As it came.
+        /// Counter as it came.
         counter: u64,
-        /// Without wraps.
+        /// Counter without wraps.
         unwrapped: u64,
     },
 }
 
-/// Why a stored filter cannot go on here.
+/// Reason why a stored filter cannot resume here.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum StoredError {
     /// The text is no state.
     #[error("expected the state of a filter, as `filter --save-state` or Python's `save` writes it: {}", .0.message())]
     Text(Box<toml::de::Error>),
-    /// Of another format or version of the program.
+    /// State of another format or version of the program.
     #[error(
         "expected the state of a filter of {expected}, found one of {found}; begin anew, or go on with that version"
     )]
     Version {
-        /// This one.
+        /// Format or version of this program.
         expected: String,
-        /// That one.
+        /// Format or version that was found.
         found: String,
     },
-    /// Of another sensor.
+    /// State of another sensor.
     #[error("the state belongs to another sensor: give the sensor.toml with which it was saved, or begin anew")]
     Sensor,
-    /// Of other options.
+    /// State of a filter with other options.
     #[error(
         "the state belongs to a filter with {name} {found}, this one has {expected}; give the same options, or begin anew"
     )]
@@ -102,14 +102,14 @@ pub enum StoredError {
     Content(Box<toml::de::Error>),
 }
 
-/// What a filter is made of.
+/// Sensor and options of a filter.
 #[derive(Clone, Debug)]
 pub(crate) struct MadeOf {
     pub params: Arc<SensorParams>,
     pub options: StoredOptions,
 }
 
-/// Options of a filter, as flags say them.
+/// Options of a filter, in the form of flags.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct StoredOptions {
@@ -242,7 +242,7 @@ impl Stored {
         struct Version {
             format: u32,
             made_by: String,
-            /// Of no other file that has the others.
+            /// Table that no other file with a format and a maker has.
             #[serde(rename = "kernel")]
             _kernel: IgnoredAny,
         }
@@ -269,7 +269,7 @@ impl Stored {
         Ok(toml::to_string(self)?)
     }
 
-    /// Whether a filter of these parts can go on from it.
+    /// Checks that a filter of these parts can resume from it.
     pub(crate) fn check(&self, made_of: &MadeOf, lag_s: Option<f64>) -> Result<(), StoredError> {
         if self.sensor != fingerprint(&made_of.params) {
             return Err(StoredError::Sensor);
@@ -283,7 +283,7 @@ impl Stored {
     }
 }
 
-/// FNV-1a of the parameters' text: tells sensors apart that were exchanged, not those that somebody forged.
+/// Returns the FNV-1a hash of the parameters' text: it detects exchanged sensors, not forged ones.
 fn fingerprint(params: &SensorParams) -> String {
     let text = toml::to_string(params).unwrap_or_default();
     let step = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);

@@ -15,7 +15,7 @@ struct Version {
     format: u32,
 }
 
-/// What a text may hold.
+/// Content of a text with a version.
 pub(crate) trait Document: DeserializeOwned {
     /// The version that is read.
     const FORMAT: u32;
@@ -23,7 +23,7 @@ pub(crate) trait Document: DeserializeOwned {
     /// Names the first number that is out of its range.
     fn check(&self) -> Result<(), FieldError>;
 
-    /// From a text of an older version; `None` for one that cannot be converted.
+    /// Converts a text of an older version; `None` if it cannot be converted.
     fn converted(_text: &str, _format: u32) -> Option<Result<Self, toml::de::Error>> {
         None
     }
@@ -42,7 +42,7 @@ impl Document for SensorParams {
     }
 }
 
-/// Of a text of format 8, which has no weights of the correction: they are learned now.
+/// Converts a text of format 8, which has no weights of the correction: they are learned now.
 #[cfg(feature = "calibrate")]
 fn of_format_8(text: &str) -> Result<SensorParams, toml::de::Error> {
     let mut table: toml::Table = toml::from_str(text)?;
@@ -85,7 +85,7 @@ pub(crate) fn parse<D: Document>(text: &str) -> Result<D, TextError> {
     }
 }
 
-/// Where a field, `law.branches[0].tau_s`, stands, or the nearest table above it that the text has.
+/// Returns the place of a field such as `law.branches[0].tau_s`, or of the nearest table above it that the text has.
 fn place_of(text: &str, field: &str) -> Option<Place> {
     let document = DeTable::parse(text).ok()?;
     let mut start = None;

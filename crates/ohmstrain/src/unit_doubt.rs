@@ -1,6 +1,6 @@
 use ohmstrain_sensor::{ReadingUnit, SensorParams};
 
-/// Median readings below this, Ω, are taken for kΩ until somebody says that they are none.
+/// Least median reading, Ω, that is not taken for kΩ, unless the unit is known.
 pub(crate) const LEAST_OHM: f64 = 20.0;
 
 /// Readings may go this far beyond those of the calibration, and in another unit they would not: sensors of one kind differ
@@ -26,15 +26,15 @@ pub struct UnitDoubt {
     pub column: &'static str,
     /// Least and largest reading of the calibration, moved to the R₀ in use.
     pub expected: (f64, f64),
-    /// That R₀, where it is not the calibration's.
+    /// R₀ in use, if it is not the calibration's.
     pub rest_reading: Option<f64>,
     /// Median of the readings.
     pub median: f64,
-    /// What they may be.
+    /// Guess of their unit.
     pub guess: UnitGuess,
 }
 
-/// What readings may be that are in the wrong unit.
+/// Guess of the unit of readings that are in the wrong one.
 ///
 /// ```
 /// assert!(ohmstrain::UnitGuess::Percent.to_string().ends_with("are they in percent?"));

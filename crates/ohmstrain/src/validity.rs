@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::Sensor;
 use crate::column::reading_column;
 
-/// Says, once for each, that a sensor is used outside of what its calibration has seen.
+/// Watch that reports, once for each kind, the use of a sensor outside its calibrated range.
 ///
 /// ```
 /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -24,10 +24,10 @@ pub struct ValidityWatch {
     validity: Validity,
     quantity: Quantity,
     reading: &'static str,
-    /// Readings that calibration has seen, moved to the R₀ that is told, and whether none is.
+    /// Calibrated range of readings, moved to the given R₀; and true if none is given.
     readings: (f64, f64),
     follows: bool,
-    /// `None` where calibration knows one session only, or R₀ is told.
+    /// Session; `None` if calibration knows one session only, or R₀ is given.
     session: Option<Session>,
     start_s: Option<f64>,
     long: bool,
@@ -48,11 +48,11 @@ pub struct ValidityWatch {
 pub struct Extrapolation {
     /// Time of the row at which it became clear, s.
     pub time_s: f64,
-    /// In what way.
+    /// Kind of use.
     pub beyond: Beyond,
 }
 
-/// In what way a sensor is used outside of what its calibration has seen.
+/// Kinds of use of a sensor outside its calibrated range.
 ///
 /// ```
 /// assert!(matches!(ohmstrain::Beyond::Duration { longest_s: 2.0 }, ohmstrain::Beyond::Duration { .. }));
@@ -60,19 +60,19 @@ pub struct Extrapolation {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Beyond {
-    /// For longer.
+    /// Longer run.
     Duration {
         /// Longest recording of the calibration, s.
         longest_s: f64,
     },
-    /// At higher rates.
+    /// Higher rates.
     Rate {
-        /// What changes.
+        /// Quantity whose rate it is.
         quantity: Quantity,
         /// 99th percentile of the calibration, 1/s.
         fastest_per_s: f64,
     },
-    /// With other readings.
+    /// Other readings.
     Readings {
         /// Name of their column.
         column: &'static str,
@@ -80,12 +80,12 @@ pub enum Beyond {
         least: f64,
         /// The largest.
         most: f64,
-        /// Whether R₀ follows them, as nobody has told it.
+        /// True if R₀ follows them, since it was not given.
         follows: bool,
     },
-    /// At other strains.
+    /// Other strains.
     Strain {
-        /// What is estimated.
+        /// Quantity that is estimated.
         quantity: Quantity,
         /// The least of the calibration.
         least: f64,
@@ -136,7 +136,7 @@ impl Session {
 }
 
 impl Outside {
-    /// Whether it is time to say so.
+    /// Counts a row, and returns true if it is time for the report.
     fn see(&mut self, outside: bool, chance: (usize, f64)) -> bool {
         self.rows += 1;
         self.outside += usize::from(outside);
@@ -147,7 +147,7 @@ impl Outside {
     }
 }
 
-/// What a [`ValidityWatch`] has seen so far, to go on from.
+/// State of a [`ValidityWatch`], to resume from.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ValiditySeen {
@@ -160,7 +160,7 @@ pub struct ValiditySeen {
 }
 
 impl ValidityWatch {
-    /// What it has seen so far.
+    /// Returns the state so far.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -178,7 +178,7 @@ impl ValidityWatch {
         ValiditySeen { start_s, long, fast, beyond_readings, beyond_strains, follower }
     }
 
-    /// Goes on from what another one of the same sensor has seen.
+    /// Resumes from the state of another watch of the same sensor.
     pub fn go_on(&mut self, seen: ValiditySeen) {
         (self.start_s, self.long, self.fast) = (seen.start_s, seen.long, seen.fast);
         (self.beyond_readings, self.beyond_strains) = (seen.beyond_readings, seen.beyond_strains);
@@ -215,8 +215,8 @@ impl ValidityWatch {
         }
     }
 
-    /// Takes a row and says what there is to say: the reading as recorded, the estimated rate, and the true strain; NaN for
-    /// what is missing. An uncertain rate is estimated near zero, so that a high one means something.
+    /// Takes a row and returns new warnings: the reading as recorded, the estimated rate, and the true strain; NaN for
+    /// missing values. An uncertain rate is estimated near zero, so that a high one means something.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;

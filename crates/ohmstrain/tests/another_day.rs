@@ -75,7 +75,7 @@ fn filtered(sensor: &Sensor, rows: &[(f64, f64)]) -> Vec<Estimate> {
     rows.iter().map(|&(time_s, reading)| filter.step(time_s, reading).unwrap()).collect()
 }
 
-/// With starts that differ by nothing the first reading tells R₀: all is as in the calibration's own session, from the first row.
+/// The first reading determines R₀ if starts differ by nothing: all is as in the calibration's own session, from the first row.
 #[test]
 fn where_sessions_begin_at_rest_the_first_reading_tells_r0() {
     let sensor = of_sessions(0.2, 1e-9);

@@ -1,4 +1,4 @@
-//! Where the interval is wider than the filter states, and the flags that say why.
+//! Intervals that are wider than the filter states, and the flags with the reason.
 
 use ohmstrain::{Estimate, EstimatorKind, Filter, Flag, Reading, Sensor};
 
@@ -30,7 +30,7 @@ fn more((doubted, stated): &(Estimate, Estimate)) -> f64 {
     (doubted.strain_sd.powi(2) - stated.strain_sd.powi(2)).sqrt()
 }
 
-/// With and without doubts, the same rows.
+/// Returns the same rows with and without doubts.
 fn both(of: impl Fn(&mut Filter) -> Vec<Estimate>) -> Vec<(Estimate, Estimate)> {
     let sensor = sensor();
     let mut filters = [sensor.filter(), sensor.filter().without_doubts()].map(|builder| builder.build().unwrap());
@@ -100,7 +100,7 @@ fn pulled() -> Sensor {
     Sensor::from_params(params).unwrap()
 }
 
-/// Whether all of the intervals hold any strain that calibration has seen.
+/// True if all of the intervals hold any strain that calibration has seen.
 fn hold_all(rows: &[Estimate]) -> bool {
     let ends = [0.0, 0.33333];
     rows.iter().all(|row| ends.iter().all(|end| (row.strain - end).abs() < 1.96 * row.strain_sd))

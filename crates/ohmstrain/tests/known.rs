@@ -94,7 +94,7 @@ fn what_cannot_be_known_is_refused() {
     }
 }
 
-/// With a lag the rows that wait hear of it, too.
+/// A known strain also changes the rows that wait for a lag.
 #[test]
 fn rows_that_wait_are_told() {
     let (sensor, (time_s, ohm)) = (sensor(), recording());

@@ -7,7 +7,7 @@ use ohmstrain::{Error, Sensor, TextCause};
 /// Written by ohmstrain 0.1.0, whose files had no weights of the correction.
 const FORMAT_8: &str = include_str!("../../../tests/fixtures/format_8.toml");
 
-/// What that version said of a hundred readings, 10 a second, `3400 + 2200 (1 - cos 0.5 t)` Ω rounded to tenths: strain and its standard
+/// Estimates of that version for a hundred readings, 10 a second, `3400 + 2200 (1 - cos 0.5 t)` Ω rounded to tenths: strain and its standard
 /// deviation at rows 20, 50 and 99 (`filter` and `smooth`, columns `time_s,strain,strain_sd`).
 const FILTERED: [(usize, f64, f64); 3] = [
     (20, 0.060723955480956715, 0.03265030925244289),
@@ -42,7 +42,7 @@ fn a_sensor_of_format_8_says_what_it_said() {
     assert_eq!(Sensor::from_toml(&written).unwrap(), sensor);
 }
 
-/// What is wrong with an old file is said as of a new one, and a version older still is refused.
+/// Errors in an old file are reported like those in a new one, and a version older still is refused.
 #[test]
 fn what_is_wrong_with_an_old_file_is_named() {
     let named = |text: &str| Sensor::from_toml(text).unwrap_err().in_file("s.toml");

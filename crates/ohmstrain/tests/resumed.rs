@@ -28,14 +28,14 @@ fn text_of(stored: &Stored) -> Stored {
     Stored::from_toml(&stored.to_toml().unwrap()).unwrap()
 }
 
-/// As text, where every digit counts and what is not known is equal.
+/// Formats rows as text, where every digit counts and unknown values are equal.
 fn shown(rows: &[Estimate]) -> Vec<String> {
     rows.iter().map(|row| format!("{row:?}")).collect()
 }
 
 const KNOWN: [Known; 2] = [Known::new(3.0, 0.1), Known::new(50.0, 0.05)];
 
-/// At the start, before and after a known strain, in a pause, after outliers and a jump, in a row of one number.
+/// Rows at which to stop: at the start, before and after a known strain, in a pause, after outliers and a jump, in a row of one number.
 const STOPS: [usize; 9] = [0, 1, 29, 31, 150, 301, 402, 650, 899];
 
 #[test]

@@ -52,7 +52,7 @@ fn serialised_rows_have_the_columns_of_estimates_csv() {
     }
 }
 
-/// Every number that serde writes is the one that its column says; what is not known is null.
+/// Every number that serde writes is that of its column; an unknown one is null.
 #[test]
 fn columns_and_fields_agree() {
     let sensor = sensor();
@@ -103,7 +103,7 @@ fn an_error_leaves_the_filter_as_it_was() {
     assert_eq!(disturbed.step(0.2, 1730.0).unwrap(), undisturbed.step(0.2, 1730.0).unwrap());
 }
 
-/// What no sensor can read is a missing reading with a name.
+/// Values that no sensor can have are missing readings with a name.
 #[test]
 fn readings_that_are_none() {
     let sensor = sensor();
@@ -137,7 +137,7 @@ fn another_rest_resistance_scales_readings() {
     }
 }
 
-/// In kΩ, in MΩ, or of a sensor of another size: wherever it enters, and not where it is a factor of 4.
+/// A resistance at rest in kΩ, in MΩ, or of a sensor of another size is refused wherever it is given; one that differs by a factor of 4 is not.
 #[test]
 fn a_rest_resistance_of_no_such_sensor_is_refused() {
     let sensor = sensor();
@@ -193,8 +193,8 @@ fn after_a_while(last: Reading) -> Estimate {
     filter.step(10.0, last).unwrap()
 }
 
-/// In a hold a reading settles no farther from itself than by all of the relaxation, whatever strain the filter believes in.
-/// Where readings end, what the filter expects to read takes their place, and is less and less certain.
+/// A reading in a hold settles no farther from itself than by all of the relaxation, whatever the filter's strain.
+/// After the last reading the filter's expected reading takes its place, and is less and less certain.
 #[test]
 fn settling_starts_from_the_reading() {
     let mut filter = sensor().filter().build().unwrap();

@@ -51,7 +51,7 @@ fn what_no_sensor_reads_is_as_good_as_missing() {
     }
 }
 
-/// At rest for ten seconds, and then up by a third of the range within eight rows: whoever waits for ten readings misses all of it.
+/// A body at rest for ten seconds moves up by a third of the range within eight rows: a gate that waits for ten readings misses all of it.
 #[test]
 fn a_gate_lets_a_body_set_off() {
     let reading = |k: i32| 2000.0 + f64::from(k % 3 - 1) + 100.0 * f64::from((k - 200).clamp(0, 8));

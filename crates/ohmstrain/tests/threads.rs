@@ -1,11 +1,11 @@
-//! What other threads may own.
+//! Types that other threads may own.
 
 use ohmstrain::{Error, Estimate, Filter, LaggedFilter, Recording, Sensor};
 
 const fn can_be_sent<T: Send + 'static>() {}
 const fn can_be_shared<T: Sync>() {}
 
-/// Of the compiler: it does not compile otherwise.
+/// Test for the compiler: it does not compile otherwise.
 #[test]
 fn filters_and_rows_can_be_sent() {
     can_be_sent::<Filter>();

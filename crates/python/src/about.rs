@@ -1,4 +1,4 @@
-//! A table's readings and reference in their units, by what is said of it or by what it says itself.
+//! A table's readings and reference in their units, by the caller's answers or by the table's own metadata.
 
 use arrow_schema::Schema;
 use ohmstrain::{JointParams, Quantity};
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Place, raise};
 
-/// What a table leaves unsaid: the lines above a trace CSV's header.
+/// Data that a table does not contain: the lines above a trace CSV's header.
 #[derive(Debug, Default, Deserialize, Serialize, FromPyObject)]
 #[pyo3(from_item_all)]
 #[serde(default)]
@@ -29,7 +29,7 @@ impl About {
         Place { file: self.name.as_deref(), ..Place::default() }
     }
 
-    /// With what the table itself knows, where nothing is said.
+    /// Completes it with the table's own metadata.
     pub fn completed(self, schema: &Schema) -> PyResult<Self> {
         let Some(text) = schema.metadata().get(ABOUT) else { return Ok(self) };
         let known: Self = serde_json::from_str(text).map_err(|error| raise(&self.place(), &error.to_string()))?;

@@ -13,7 +13,7 @@ use crate::options::estimator;
 use crate::recording::Recording;
 use crate::sensor::Sensor;
 
-/// What is left to choose.
+/// Choices of a calibration.
 #[derive(Debug, Default, FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Choices {
@@ -22,7 +22,7 @@ pub struct Choices {
     gauge: Option<String>,
     /// The text of a `prior.toml`.
     prior: Option<String>,
-    /// Whether a reference that is late is moved.
+    /// True if a late reference is to be moved.
     align: bool,
 }
 
@@ -72,7 +72,7 @@ fn parsed(text: &str) -> PyResult<Prior> {
     Prior::from_toml(text).map_err(|error| of_library(&error, None))
 }
 
-/// What sensors of one make have in common, as the text of a `prior.toml`.
+/// Returns the prior that sensors of one make have in common, as the text of a `prior.toml`.
 #[pyfunction]
 pub fn fit_prior(py: Python, sensors: Vec<PyRef<Sensor>>) -> PyResult<String> {
     let sensors: Vec<ohmstrain::Sensor> = sensors.iter().map(|sensor| sensor.sensor.clone()).collect();
@@ -86,7 +86,7 @@ pub fn check_prior(text: &str, file: Option<&str>) -> PyResult<()> {
     Prior::from_toml(text).map(|_| ()).map_err(|error| of_library(&error, file))
 }
 
-/// The sensor behind the first rows of recordings, as many as `rows` says of each; and what is to be said of it.
+/// Calibrates a sensor on the first `rows` of each recording; returns it with the warnings.
 pub fn calibrated(
     py: Python,
     recordings: &[Recording],
@@ -115,7 +115,7 @@ pub fn calibrated(
     Ok((Sensor { sensor: calibrated.sensor }, warnings))
 }
 
-/// As the command line does it: rows that nobody can trust are left out first, and doubts are answered.
+/// Calibrates as the command line does: untrustworthy rows are left out first, and doubts are answered.
 fn run(
     recordings: &[Recording],
     rows: &[usize],

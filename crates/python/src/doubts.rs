@@ -53,7 +53,7 @@ pub fn on_one_clock(recordings: &mut [Recording], align: bool) -> PyResult<Vec<S
     Ok(warnings)
 }
 
-/// Doubts about strains that are said to be known, in a recording from the first to the last time, s.
+/// Returns doubts about known strains, in a recording from the first to the last time, s.
 pub fn of_known(sensor: &ohmstrain::Sensor, start: Option<f64>, known: &[Known], times: (f64, f64)) -> Vec<String> {
     let start = start.and_then(|start| sensor.check_start(start).err()).map(|doubt| doubt.text(Interface::Python));
     let unused = ohmstrain::unused_known(known, times).into_iter().map(|doubt| doubt.text(Interface::Python));

@@ -10,7 +10,7 @@ create_exception!(
     "What is wrong with a table, a sensor file or an option: `file`, `row` (from zero) and `column` say where, if it is known."
 );
 
-/// Where something is wrong.
+/// Place of an error.
 #[derive(Debug, Default)]
 pub struct Place<'a> {
     /// File, or what a recording is called.
@@ -42,12 +42,12 @@ pub fn raise(place: &Place, message: &str) -> PyErr {
     })
 }
 
-/// Why rows were not gone through to the end.
+/// Reason why rows were not processed to the end.
 #[derive(Debug)]
 pub enum Stopped {
     /// The library refuses them.
     Refused(Error),
-    /// The user, or whoever sent a signal; or an exception that says why.
+    /// Interruption by the user or another sender of a signal; or an exception with its reason.
     Interrupted(PyErr),
 }
 
@@ -62,7 +62,7 @@ pub fn heed() -> PyResult<()> {
     Python::attach(|py| py.check_signals())
 }
 
-/// What the library refuses, of a recording or file of this name.
+/// Converts an error of the library on a recording or file of this name.
 pub fn of_library(error: &Error, file: Option<&str>) -> PyErr {
     let place = Place { file, ..Place::default() };
     match error {

@@ -7,7 +7,7 @@ use crate::error::{Place, of_library, raise};
 use crate::options::Options;
 use crate::recording::Recording;
 
-/// What is scored by name, and its scores as JSON.
+/// Names of the scored estimators, and their scores as JSON.
 pub type Scored = Vec<(&'static str, String)>;
 
 /// Scores of filter, smoother and static cubic on the rows at a time or later; the filter starts at the first row.
@@ -64,7 +64,7 @@ fn fitted(recording: &Recording, rows: usize) -> Result<Baselines, CalibrationEr
     Baselines::fit(&screen(&samples)?.samples())
 }
 
-/// The published law, fitted to the rows before `rows` and told the phases.
+/// Fits the published law to the rows before `rows`, and gives it the phases.
 fn published(recording: &Recording, rows: usize, truth: &[f64]) -> Option<impl Baseline> {
     let (time_s, reading, strain) = recording.until(rows);
     let samples = [Samples::new(time_s, reading, strain.unwrap_or(&[])).ok()?];
@@ -115,7 +115,7 @@ impl Part<'_> {
         self.scores(|row| (strains[row], None))
     }
 
-    /// Of filter and smoother.
+    /// Returns the scores of filter and smoother.
     fn of_estimates(&self, sensor: &Sensor, options: &Options) -> PyResult<Vec<(&'static str, Option<Scores>)>> {
         let len = self.truth.len();
         let mut filter = options.builder(sensor)?.build().map_err(|error| self.recording.refused(&error))?;

@@ -27,7 +27,7 @@ pub struct LiveFilter {
 struct Running {
     filter: ohmstrain::Filter,
     watch: Watch,
-    /// What the rested sensor reads, if not what it read in calibration.
+    /// Reading of the rested sensor, if it differs from that in calibration.
     rest_resistance: Option<f64>,
 }
 
@@ -140,7 +140,7 @@ impl LiveFilter {
         Ok((estimates.into_batch()?, std::mem::take(&mut watch.warnings)))
     }
 
-    /// All that the next row depends on, as TOML, with the moment that is 0 s.
+    /// Stores all that the next row depends on, as TOML, with the moment that is 0 s.
     #[pyo3(signature = (zero_ns=None))]
     fn store(&self, py: Python, zero_ns: Option<i64>) -> PyResult<String> {
         let running = locked(&self.running, py);
@@ -175,7 +175,7 @@ impl LaggedFilter {
         rows.iter().map(|estimate| row(py, &self.columns, estimate)).collect()
     }
 
-    /// All that the next row depends on, as TOML.
+    /// Stores all that the next row depends on, as TOML.
     fn store(&self, py: Python) -> PyResult<String> {
         locked(&self.filter, py).store().and_then(|stored| stored.to_toml()).map_err(refused)
     }

@@ -3,7 +3,7 @@ use pyo3::prelude::*;
 
 use crate::error::{Place, of_library, raise};
 
-/// How a filter is to be: the flags of `ohmstrain filter`.
+/// Options of a filter: the flags of `ohmstrain filter`.
 #[derive(Clone, Debug, Default, FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Options {
@@ -20,7 +20,7 @@ pub struct Options {
     columns: Option<Vec<String>>,
 }
 
-/// What the rested sensor reads now.
+/// Present reading of the rested sensor.
 #[derive(Clone, Debug, FromPyObject)]
 enum Rest {
     Reading(f64),
@@ -28,7 +28,7 @@ enum Rest {
 }
 
 impl Options {
-    /// What the rested sensor reads now, if that is said.
+    /// Returns the present reading of the rested sensor, if it was given.
     pub fn rest_resistance(&self, sensor: &Sensor) -> PyResult<Option<f64>> {
         match &self.rest_resistance {
             None => Ok(None),
@@ -58,7 +58,7 @@ impl Options {
         chosen.iter().map(column).collect()
     }
 
-    /// With the learned correction, if the sensor has one.
+    /// Turns on the learned correction, if the sensor has one.
     pub fn with_correction(self) -> Self {
         Self { correction: true, ..self }
     }

@@ -16,7 +16,7 @@ use pyo3_arrow::PyRecordBatch;
 use crate::about::{ABOUT, About};
 use crate::error::{Place, raise};
 
-/// What is said of files: the flags of `ohmstrain import`, and the units of a trace's columns.
+/// Answers about files: the flags of `ohmstrain import`, and the units of a trace's columns.
 #[derive(Debug, FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Said {
@@ -100,7 +100,7 @@ impl Said {
         })
     }
 
-    /// Whether all that is said can be said of a trace.
+    /// True if all answers apply to a trace.
     fn is_of_trace(recipe: &Recipe) -> bool {
         let (front_end, joint, gauge_length_mm) = (recipe.front_end, recipe.joint, recipe.gauge_length_mm);
         let mut bare = Recipe { front_end, joint, gauge_length_mm, ..Recipe::default() };
@@ -161,7 +161,7 @@ fn imported(paths: &[String], recipe: &Recipe) -> PyResult<(Trace, Vec<String>)>
     Ok((imported.trace, imported.remarks))
 }
 
-/// Its columns, in the units that they have inside, and what else it says in the schema's metadata.
+/// Returns its columns, in the units that they have inside, and its other metadata in the schema's.
 fn table(trace: &Trace, paths: &[String]) -> PyResult<PyRecordBatch> {
     let failed = |error: ArrowError| refused(error);
     let numbers = |values: &[f64]| -> ArrayRef {

@@ -19,13 +19,13 @@ use crate::error::{Place, Stopped, heed, of_library, raise};
 /// A recording as the library takes it. NaN stands for what is missing.
 #[derive(Debug)]
 pub struct Recording {
-    /// What messages call it.
+    /// Name in messages.
     pub name: Option<String>,
     /// Times, s.
     pub time_s: Vec<f64>,
     /// Readings.
     pub readings: Vec<f64>,
-    /// What a converter's codes tell beyond them: deviation, Ω, and whether it stood at an end of its scale.
+    /// Data of a converter's codes: deviation, Ω, and true if it stood at an end of its scale.
     converter: Option<Vec<(f64, bool)>>,
     /// Unit of the readings.
     pub unit: ReadingUnit,
@@ -33,9 +33,9 @@ pub struct Recording {
     pub reference: Option<(Quantity, Vec<f64>)>,
     /// The joint that the sensor sits on.
     pub joint: Option<JointParams>,
-    /// Whether somebody has said what the strains are in.
+    /// True if the user has given the unit of the strains.
     knows_strain_unit: bool,
-    /// Whether somebody has said what the readings are in, or electronics tell it.
+    /// True if the user, or electronics, have given the unit of the readings.
     knows_resistance_unit: bool,
 }
 
@@ -136,7 +136,7 @@ impl Recording {
         (self.time_s[row], Reading { value: self.readings[row], sd, saturated })
     }
 
-    /// What a filter makes of each row, in turn; heeds an interrupt.
+    /// Filters the rows in turn, and passes each estimate to `take`; an interrupt stops it.
     pub fn filtered(&self, filter: &mut Filter, mut take: impl FnMut(usize, &Estimate)) -> PyResult<()> {
         for row in 0..self.time_s.len() {
             if row % HEEDED == HEEDED - 1 {
@@ -152,7 +152,7 @@ impl Recording {
         Ok(())
     }
 
-    /// What a smoother makes of the rows, in segments from the last to the first; heeds an interrupt on its way back.
+    /// Smooths the rows, in segments from the last to the first; an interrupt on its way back stops it.
     pub fn smoothed(&self, builder: FilterBuilder, mut take: impl FnMut(Range<usize>, &[Estimate])) -> PyResult<()> {
         let done = builder.smooth_backward(
             self.time_s.len(),
@@ -168,7 +168,7 @@ impl Recording {
         })
     }
 
-    /// What the library refuses of it.
+    /// Converts an error of the library on it.
     pub fn refused(&self, error: &Error) -> PyErr {
         of_library(error, self.name.as_deref())
     }

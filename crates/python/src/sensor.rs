@@ -21,7 +21,7 @@ pub struct Sensor {
 }
 
 impl Sensor {
-    /// On the joint of a recording, if it has one; with its readings checked.
+    /// Returns the sensor on the joint of a recording, if it has one; with its readings checked.
     fn for_recording(&self, recording: &Recording, options: &Options) -> PyResult<Cow<'_, ohmstrain::Sensor>> {
         recording.check_unit(&self.sensor, options.rest_resistance(&self.sensor)?)?;
         self.on_joint(recording.joint, recording.name.as_deref())
@@ -50,7 +50,7 @@ impl Sensor {
         self.sensor.to_toml().map_err(|error| of_library(&error, None))
     }
 
-    /// What the calibration came to: names and sentences.
+    /// Returns the summary of the calibration: names and sentences.
     fn closing(&self, file: Option<&str>) -> Option<Vec<(&'static str, String)>> {
         let params = self.sensor.params();
         let findings = Some(params.findings.as_ref()?);
@@ -89,7 +89,7 @@ impl Sensor {
         Ok(options.columns(&sensor)?.iter().map(ohmstrain::Column::name).collect())
     }
 
-    /// Of readings as they come, on a joint if there is one.
+    /// Creates a filter for readings as they come, on a joint if there is one.
     #[pyo3(signature = (options, about=About::default()))]
     fn live(&self, options: Options, about: About) -> PyResult<LiveFilter> {
         let sensor = self.on_joint(about.joint()?, None)?;
@@ -112,7 +112,7 @@ impl Sensor {
         Ok(LiveFilter::resumed(filter, self.sensor.clone(), columns, told, options.known.clone(), stored))
     }
 
-    /// The same with a lag.
+    /// Resumes a filter with a lag.
     #[pyo3(signature = (options, lag_s, state, file=None))]
     fn resume_lagged(&self, options: Options, lag_s: f64, state: &str, file: Option<&str>) -> PyResult<LaggedFilter> {
         let filter = options.builder(&self.sensor)?.resume_lagged(lag_s, &stored(state, file)?);

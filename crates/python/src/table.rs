@@ -39,7 +39,7 @@ impl Estimates {
         }
     }
 
-    /// As a table, of which Arrow's Python makes one faster in this form than in pieces.
+    /// Converts it to a table. Arrow's Python makes one faster in this form than in pieces.
     pub fn into_batch(self) -> PyResult<PyRecordBatch> {
         let failed = |error: ArrowError| raise(&Place::default(), &error.to_string());
         let (mut fields, mut arrays): (Vec<Field>, Vec<ArrayRef>) = (Vec::new(), Vec::new());

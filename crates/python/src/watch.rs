@@ -6,16 +6,16 @@ use crate::recording::Recording;
 /// Estimates and what casts doubt on them.
 pub type Doubtful = (PyRecordBatch, Vec<String>);
 
-/// Says when the calibration does not reach.
+/// Watch for use outside the calibrated range.
 pub struct Watch {
     watch: ValidityWatch,
     quiet: QuietWatch,
-    /// What it has said.
+    /// Warnings so far.
     pub warnings: Vec<String>,
 }
 
 impl Watch {
-    /// Of a sensor, what it reads at rest, if that is said, and strains that are known.
+    /// Creates the watch for a sensor, with its reading at rest, if it was given, and known strains.
     pub fn new(sensor: &ohmstrain::Sensor, rest_resistance: Option<f64>, known: &[Known]) -> Self {
         let watch = ValidityWatch::new(sensor, rest_resistance);
         Self { watch, quiet: QuietWatch::new(sensor, rest_resistance, known), warnings: Vec::new() }
@@ -26,7 +26,7 @@ impl Watch {
         (stored.validity, stored.quiet) = (Some(self.watch.seen()), Some(self.quiet.seen()));
     }
 
-    /// Goes on from what a state has seen.
+    /// Resumes from a stored state.
     pub fn go_on(&mut self, stored: Stored) {
         stored.validity.into_iter().for_each(|seen| self.watch.go_on(seen));
         stored.quiet.into_iter().for_each(|seen| self.quiet.go_on(seen));
@@ -39,7 +39,7 @@ impl Watch {
         self.warnings.extend(seen.map(|warning| format!("{}{warning}", recording.before())));
     }
 
-    /// Takes what a filter says of a row, and asks whether a long hold was a rest.
+    /// Takes a filter's estimate of a row, and asks if a long hold was a rest.
     pub fn see_rest(&mut self, recording: &Recording, estimate: &Estimate) {
         let quiet = self.quiet.see(estimate);
         self.warnings.extend(quiet.map(|quiet| format!("{}{}", recording.before(), quiet.text(Interface::Python))));

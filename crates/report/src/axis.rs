@@ -11,7 +11,7 @@ use ohmstrain::number;
 
 /// Largest magnitude on an axis: the difference of two such numbers is still finite.
 const LARGEST: f64 = 1e300;
-/// Shortest range, relative to the numbers in it, below which neighbouring ticks could not be told apart.
+/// Shortest range, relative to the numbers in it; below it neighbouring ticks would look the same.
 const SHORTEST: f64 = 1e-9;
 /// Space left free at both ends, as a share of the range.
 const MARGIN: f64 = 0.04;
@@ -74,7 +74,7 @@ impl Axis {
         Self { label: label.into(), low, high, log: true, ticks, step: low }
     }
 
-    /// Where a value lies, 0 at the lower and 1 at the upper end; what lies outside is moved to the end. NaN stays NaN.
+    /// Returns the position of a value, 0 at the lower and 1 at the upper end; outside, the position of the nearer end. NaN stays NaN.
     pub fn unit(&self, value: f64) -> f64 {
         let share = if self.log {
             (value.max(self.low) / self.low).ln() / (self.high / self.low).ln()
@@ -201,7 +201,7 @@ mod tests {
         }
     }
 
-    /// To rounding: a few units in the last place of the larger end.
+    /// Tests that a position gives the value back, to rounding: a few units in the last place of the larger end.
     #[test]
     fn a_place_gives_the_value_back() {
         for axis in [Axis::linear("", -3.0, 7.0, 5), Axis::logarithmic("", 0.1, 300.0)] {

@@ -48,7 +48,7 @@ struct Layer {
     shape: Shape,
 }
 
-/// In shares of the plot's width and height.
+/// Shape of a layer, in shares of the plot's width and height.
 #[derive(Debug)]
 enum Shape {
     Lines(Vec<Vec<Point>>),
@@ -63,7 +63,7 @@ impl Chart {
         Self { size_px, x, y, layers: vec![], legend: vec![] }
     }
 
-    /// What the layers are, in their order.
+    /// Returns the keys of the layers, in their order.
     pub fn legend(&self) -> Vec<Key> {
         self.legend.clone()
     }
@@ -103,7 +103,7 @@ impl Chart {
         }
     }
 
-    /// Single points, one for all that could not be told apart.
+    /// Adds single points, one for all that would look the same.
     pub fn dots(&mut self, ink: Ink, name: &str, points: impl IntoIterator<Item = Point>) {
         let (width, height) = self.area_px();
         let mut visited = HashSet::new();
@@ -197,7 +197,7 @@ impl Chart {
         self.area_px().0 as usize
     }
 
-    /// What is drawn as `series,part,x,y`: points of lines and dots, corners of areas, opposite corners of boxes.
+    /// Returns the drawn data as `series,part,x,y`: points of lines and dots, corners of areas, opposite corners of boxes.
     pub fn csv(&self) -> String {
         let quoted = |text: &str| format!("\"{}\"", text.replace('"', "'"));
         let mut csv = format!("series,part,{},{}\n", quoted(&self.x.label), quoted(&self.y.label));
@@ -221,7 +221,7 @@ impl Chart {
     }
 }
 
-/// With as many digits as a drawing shows, and more.
+/// Rounds to more digits than a drawing shows.
 fn rounded(value: f64) -> f64 {
     format!("{value:.6e}").parse().unwrap_or(value)
 }

@@ -18,16 +18,16 @@ pub struct Figure {
     pub title: String,
     /// The drawing; markup, not to be escaped.
     pub svg: String,
-    /// What its layers are.
+    /// Keys of its layers.
     pub legend: Vec<Key>,
-    /// How to read it.
+    /// Note on how to read it.
     pub note: String,
     /// Shares its line with the next one.
     pub half: bool,
     /// Name of its files without their ending: the same for every recording, so that a paper can include them.
     #[serde(skip)]
     pub file: String,
-    /// What it was drawn from.
+    /// Chart that it was drawn from.
     #[serde(skip)]
     pub chart: Chart,
 }

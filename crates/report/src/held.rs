@@ -39,7 +39,7 @@ pub fn relaxation(recording: &PlottedRecording) -> Result<Option<Figure>, Report
 /// Parts of a decade over which a rate is taken.
 const PER_DECADE: f64 = 8.0;
 
-/// How fast the readings change in the longest holds, or nothing if there is none.
+/// Draws the rate of the readings in the longest holds; `None` if there is no hold.
 pub fn rate(recording: &PlottedRecording) -> Result<Option<Figure>, ReportError> {
     let held: Vec<(Curve, &Hold)> =
         recording.longest_holds().iter().filter_map(|hold| Some((Curve::new(recording, hold)?, hold))).collect();

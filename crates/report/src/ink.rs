@@ -1,4 +1,4 @@
-//! What things look like: one table for plots, legends and style sheet.
+//! Inks: one table for plots, legends and style sheet.
 //!
 //! The plotting library writes colours into the drawing. Each ink has a colour of its own there, by which the style
 //! sheet finds it and gives it the hue of the page's light or dark scheme, and its dashes. Hues follow Okabe and Ito's
@@ -6,7 +6,7 @@
 
 use serde::Serialize;
 
-/// How one kind of thing is drawn.
+/// Style of one kind of thing in a drawing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ink {
     /// Its mark in the drawing, and its colour where style sheets are ignored.
@@ -26,15 +26,15 @@ impl Ink {
     pub const RECORDED: Self = Self::line((0x1A, 0x1A, 0x1A), "ink", 1.1);
     /// The reference.
     pub const TRUTH: Self = Self::line((0x1B, 0x1B, 0x1B), "ink", 1.6);
-    /// What the filter says.
+    /// Estimate of the filter.
     pub const FILTER: Self = Self::line((0x00, 0x72, 0xB2), "blue", 1.6);
     /// The filter's line where another one runs on top of it.
     pub const FILTER_BELOW: Self = Self { opacity: 0.6, ..Self::line((0x00, 0x72, 0xB1), "blue", 4.5) };
     /// The filter's uncertainty.
     pub const FILTER_BAND: Self = Self { opacity: 0.25, ..Self::line((0x00, 0x72, 0xB3), "blue", 8.0) };
-    /// What the smoother says.
+    /// Estimate of the smoother.
     pub const SMOOTHER: Self = Self::dashed((0xD5, 0x5E, 0x00), "red", 1.6, &[7, 3]);
-    /// What the law says.
+    /// Prediction of the law.
     pub const LAW: Self = Self::dashed((0x00, 0x7A, 0x59), "green", 1.6, &[7, 3]);
     /// The law's uncertainty.
     pub const LAW_BAND: Self = Self { opacity: 0.22, ..Self::line((0x00, 0x7A, 0x5A), "green", 8.0) };
@@ -56,11 +56,11 @@ impl Ink {
         Self::line((0x00, 0x72, 0xB8), "blue", 1.2),
         Self::line((0xD5, 0x5E, 0x04), "red", 1.2),
     ];
-    /// Where a hold begins.
+    /// Start of a hold.
     pub const BEGUN: Self = Self::line((0xD5, 0x5E, 0x05), "red", 6.0);
-    /// Where a hold ends.
+    /// End of a hold.
     pub const ENDED: Self = Self::line((0x00, 0x72, 0xB9), "blue", 6.0);
-    /// Which way a line goes.
+    /// Direction of a line.
     pub const ARROWS: Self = Self::line((0x1D, 0x1D, 0x1D), "ink", 1.0);
     /// A bound.
     pub const BOUND: Self = Self::dashed((0xA3, 0x3B, 0x7B), "purple", 1.6, &[2, 3]);
@@ -171,7 +171,7 @@ pub struct Key {
     pub width: f64,
     /// A dot, and no line.
     pub is_dot: bool,
-    /// What it is.
+    /// Name of the series.
     pub name: String,
 }
 

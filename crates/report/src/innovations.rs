@@ -1,4 +1,4 @@
-//! Whether the filter's own errors are as large as it says, and independent of one another.
+//! Test of the filter's innovations: as large as stated, and independent of one another.
 
 use ohmstrain::Estimate;
 
@@ -6,7 +6,7 @@ use ohmstrain::Estimate;
 pub struct Innovations {
     /// |z|, row by row; NaN where the reading was missing.
     pub size: Vec<f64>,
-    /// How many are known.
+    /// Number of known innovations.
     pub count: usize,
     /// Mean of z²; 1 if the filter's covariance is right.
     pub mean_square: f64,
@@ -25,7 +25,7 @@ const BINS: usize = 20;
 const SHOWN_BLOCKS: usize = 60;
 
 impl Innovations {
-    /// From a filter's estimates.
+    /// Collects the innovations of a filter's estimates.
     pub fn new(rows: &[Estimate]) -> Self {
         let size: Vec<f64> =
             rows.iter().map(|row| row.nis.filter(|nis| *nis >= 0.0).map_or(f64::NAN, f64::sqrt)).collect();
@@ -37,7 +37,7 @@ impl Innovations {
         Self { size, count, mean_square, share_beyond }
     }
 
-    /// Where the mean square should be with 95 % probability: χ² with `count` degrees of freedom over `count`, as a
+    /// Returns the range of the mean square with 95 % probability: χ² with `count` degrees of freedom over `count`, as a
     /// Gaussian.
     pub fn mean_square_range(&self) -> (f64, f64) {
         let half = BOUND * (2.0 / self.count.max(1) as f64).sqrt();
@@ -79,7 +79,7 @@ impl Innovations {
         counts.iter().enumerate().map(|(i, count)| (edge(i), edge(i + 1), density(*count))).collect()
     }
 
-    /// What the histogram should look like: the density of the root of a χ² variable with one degree of freedom.
+    /// Returns the expected density of the histogram: that of the root of a χ² variable with one degree of freedom.
     pub fn expected_density(z: f64) -> f64 {
         (2.0 / std::f64::consts::PI).sqrt() * (-0.5 * z * z).exp()
     }

@@ -1,4 +1,4 @@
-//! What the sensor's law says of a recording.
+//! Predictions of the sensor's law for a recording.
 
 use std::collections::BTreeMap;
 
@@ -19,7 +19,7 @@ pub struct Law<'a> {
 pub struct Driven {
     /// Readings, row by row; NaN where the strain is missing.
     pub reading: Vec<f64>,
-    /// What the law remembers at the rows that were asked for: the branches.
+    /// Memory of the law, its branches, at the rows that were asked for.
     pub memories: BTreeMap<usize, Vec<f64>>,
 }
 
@@ -127,7 +127,7 @@ impl<'a> Law<'a> {
         self.reading(self.gauge(strain) + self.remembered(memory, elapsed_s))
     }
 
-    /// What branches add to the reading after `elapsed_s` seconds of rest.
+    /// Returns the contribution of the branches to the reading after `elapsed_s` seconds of rest.
     fn remembered(&self, memory: &[f64], elapsed_s: f64) -> f64 {
         let factors = self.branches.iter().map(|branch| (-elapsed_s / branch.tau_s).exp());
         factors.zip(memory).map(|(factor, value)| factor * value).sum()

@@ -36,7 +36,7 @@ pub use law::Law;
 use recording::PlottedRecording;
 use tables::Table;
 
-/// What a report shows. All slices have one entry per row of the recording.
+/// Content of a report. All slices have one entry per row of the recording.
 #[derive(Clone, Debug)]
 pub struct ReportInput<'a> {
     /// Heading, the recording's name for instance.
@@ -59,15 +59,15 @@ pub struct ReportInput<'a> {
     pub rest_reading: f64,
     /// The part that the scores are about.
     pub scored: Scored,
-    /// Whether that part was calibrated on.
+    /// Sample that the part belongs to.
     pub sample: Sample,
     /// The estimator.
     pub estimator: EstimatorKind,
     /// Scores, the filter's first.
     pub scores: &'a [ScoreRow<'a>],
-    /// What the scores are worth, in a sentence.
+    /// Verdict on the scores, in a sentence.
     pub verdict: Option<String>,
-    /// What else there is to say of the calibration: heading and text.
+    /// Further facts about the calibration: heading and text.
     pub facts: &'a [(&'static str, String)],
 }
 
@@ -80,19 +80,19 @@ pub struct Scored {
     pub until_s: Option<f64>,
 }
 
-/// Whether rows were calibrated on.
+/// Overlap of rows with the calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sample {
     /// All of them.
     In,
-    /// Some of them.
+    /// Partly in the sample.
     Partly,
     /// None.
     Out,
 }
 
 impl Sample {
-    /// In a word.
+    /// Returns its name, in a word or two.
     pub const fn name(self) -> &'static str {
         match self {
             Self::In => "in-sample",
@@ -102,14 +102,14 @@ impl Sample {
     }
 }
 
-/// How well one estimator did.
+/// Scores of one estimator.
 #[derive(Clone, Copy, Debug)]
 pub struct ScoreRow<'a> {
     /// Its name.
     pub name: &'a str,
     /// Root mean squared error, in the quantity's unit.
     pub rmse: f64,
-    /// The same in percent of full scale.
+    /// Root mean squared error in percent of full scale.
     pub rmse_percent_fs: f64,
     /// Share of rows, 0 to 1, whose 95 % interval holds the reference; `None` for an estimator without intervals.
     pub coverage_95: Option<f64>,
@@ -119,7 +119,7 @@ pub struct ScoreRow<'a> {
     pub crps_percent_fs: f64,
 }
 
-/// Why there is no report.
+/// Reason for having no report.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReportError {
@@ -131,7 +131,7 @@ pub enum ReportError {
     Template(#[from] minijinja::Error),
 }
 
-/// What the template shows.
+/// Content of the template.
 #[derive(Debug, Serialize)]
 struct Page<'a> {
     title: &'a str,
@@ -152,7 +152,7 @@ struct Page<'a> {
 #[derive(Debug, Serialize)]
 struct Section {
     title: &'static str,
-    /// Whether it is folded until somebody asks for it.
+    /// True if it is folded at first.
     folded: bool,
     text: String,
     figures: Vec<Figure>,
@@ -165,7 +165,7 @@ pub struct FigureFiles {
     pub name: String,
     /// The drawing.
     pub svg: String,
-    /// What is drawn.
+    /// Drawn data.
     pub csv: String,
 }
 
@@ -200,7 +200,7 @@ impl<'a> Report<'a> {
         Ok(Self { page })
     }
 
-    /// As HTML.
+    /// Renders the report as HTML.
     ///
     /// # Errors
     /// If the template cannot be filled; no input is known that does this.
@@ -210,7 +210,7 @@ impl<'a> Report<'a> {
         Ok(environment.get_template("report.html")?.render(Serde(&self.page))?)
     }
 
-    /// Every plot as files of its own.
+    /// Returns every plot as files of its own.
     ///
     /// # Errors
     /// If a plot cannot be drawn; no input is known that does this.

@@ -1,17 +1,17 @@
-//! Where a strain rises, falls and stands still.
+//! Parts of a recording in which the strain rises, falls and stands still.
 
 use std::collections::VecDeque;
 
 use super::axis::extent;
 
-/// What the strain does at a row.
+/// Motion of the strain at a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Motion {
-    /// It rises.
+    /// Rising strain.
     Extend,
-    /// It falls.
+    /// Falling strain.
     Retract,
-    /// It stands still.
+    /// Constant strain.
     Hold,
 }
 
@@ -32,7 +32,7 @@ pub struct Hold {
 const LEVELS_APART: f64 = 0.1;
 /// A hold's strain stays within this share of the recording's whole range.
 const TOLERANCE: f64 = 0.005;
-/// With a tolerance this much wider a hold grows by its edges only; the turning point of a sine grows by 1.7, the tip
+/// Factor on the tolerance for a check of a hold, which grows by its edges only; the turning point of a sine grows by 1.7, the tip
 /// of a triangle threefold.
 const WIDER: f64 = 3.0;
 const MOST_GROWTH: f64 = 1.35;
@@ -170,7 +170,7 @@ fn hold(samples: &[Sample], window: (usize, usize)) -> Option<Hold> {
     Some(Hold { first: first.row, last: last.row, strain, duration_s: last.time_s - first.time_s })
 }
 
-/// What the strain does at each row, turning points found by how far it goes back, `holds` laid over it.
+/// Returns the motion of the strain at each row: turning points are found by the distance that the strain goes back, `holds` laid over it.
 pub fn motions(time_s: &[f64], strain: &[f64], holds: &[Hold]) -> Vec<Motion> {
     let (samples, range) = known(time_s, strain);
     let mut motions = vec![Motion::Extend; time_s.len()];

@@ -13,10 +13,10 @@ const MOVEMENTS: usize = 14;
 const MOST_PIECES: usize = 48;
 /// Height of a piece, px.
 const HEIGHT_PX: f64 = 220.0;
-/// What a movement of usual length takes of a plot's width at least.
+/// Least width of a movement of usual length, as a share of the plot's.
 const VISIBLE: f64 = 1.0 / 40.0;
 
-/// The strain in pieces of equal numbers of rows, and what is to be said of them; none if one plot shows all movements.
+/// Draws the strain in pieces of equal numbers of rows, with a sentence on them; no figure if one plot shows all movements.
 pub fn strain(recording: &PlottedRecording) -> Result<(Vec<Figure>, String), ReportError> {
     let wanted = count(&recording.motions, recording.time_s);
     let pieces = wanted.min(MOST_PIECES);
@@ -43,8 +43,8 @@ pub fn strain(recording: &PlottedRecording) -> Result<(Vec<Figure>, String), Rep
     Ok(((0..pieces).map(piece).collect::<Result<_, ReportError>>()?, note))
 }
 
-/// How many pieces it takes: for their number of movements, and for movements that are short beside the recording, as ramps
-/// between long holds are.
+/// Returns the number of pieces: enough for the number of movements, and for movements that are short beside the recording, like
+/// ramps between long holds.
 fn count(motions: &[Motion], time_s: &[f64]) -> usize {
     let ends: Vec<usize> = (1..motions.len()).filter(|row| motions[*row] != motions[*row - 1]).collect();
     let lasting = |pair: &[usize]| time_s.get(pair[1]).zip(time_s.get(pair[0])).map(|(end, start)| end - start);

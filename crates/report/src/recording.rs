@@ -36,7 +36,7 @@ pub struct PlottedRecording<'a> {
     pub scored: Scored,
     /// The sensor's law.
     pub law: Law<'a>,
-    /// What the strain does, row by row.
+    /// Motion of the strain, row by row.
     pub motions: Vec<Motion>,
     /// The law driven by the reference.
     pub driven: Option<Driven>,
@@ -46,7 +46,7 @@ pub struct PlottedRecording<'a> {
 }
 
 impl<'a> PlottedRecording<'a> {
-    /// Everything that more than one plot needs.
+    /// Prepares the data that more than one plot needs.
     pub fn new(input: &ReportInput<'a>) -> Self {
         let truth = input.truth.filter(|truth| truth.iter().any(|x| x.is_finite()));
         let estimates = if input.smoothed.is_empty() { input.filtered } else { input.smoothed };
@@ -98,7 +98,7 @@ impl<'a> PlottedRecording<'a> {
         &self.held
     }
 
-    /// What the law remembers at the start of one of the longest holds.
+    /// Returns the law's memory at the start of one of the longest holds.
     pub fn memory_at(&self, row: usize) -> Option<&[f64]> {
         self.held_driven.memories.get(&row).map(Vec::as_slice)
     }
@@ -178,7 +178,7 @@ pub const Z_95: f64 = 1.96;
 /// Share of the limits' span within which an estimate leans on them.
 const AT_LIMIT: f64 = 0.02;
 
-/// Whether an estimated strain is away from the limits: one that they hold back does not mean that the body stands
+/// True if an estimated strain is away from the limits: an estimate that they hold back does not mean that the body stands
 /// still.
 fn is_free(strain: f64, params: &SensorParams) -> bool {
     let (limits, margin) = (params.limits, AT_LIMIT * params.limits.span());

@@ -72,7 +72,7 @@ fn arrows(recording: &PlottedRecording) -> Vec<(Point, Point)> {
     movements.into_iter().step_by(every).filter_map(step).collect()
 }
 
-/// The gauge curve where it was fitted, with what the recording says of it, and its slopes.
+/// Draws the gauge curve where it was fitted, with the recording's evidence on it, and its slopes.
 pub fn gauge(recording: &PlottedRecording) -> Result<Figure, ReportError> {
     let range = recording.params.law.range;
     let curve = recording.gauge_curve(Some((range.lower, range.upper)));

@@ -1,4 +1,4 @@
-//! What the report says in words.
+//! Sentences of the report.
 
 use ohmstrain_sensor::Quantity;
 
@@ -40,7 +40,7 @@ fn scored(score: &ScoreRow, input: &ReportInput) -> String {
     format!("{what} to {error} of full scale RMS ({own}), {}{part}{coverage}.", input.sample.name())
 }
 
-/// How long the recording is, and what is missing.
+/// Describes the length of the recording, and what is missing.
 pub fn extent_of(recording: &PlottedRecording) -> String {
     let rows = recording.time_s.len();
     let missing = rows.saturating_sub(recording.reading.iter().filter(|reading| reading.is_finite()).count());
@@ -54,7 +54,7 @@ pub fn extent_of(recording: &PlottedRecording) -> String {
     format!("The recording has {rows} over {} s; {missing}.", plain(duration))
 }
 
-/// What the innovations say of the filter.
+/// Describes the filter's consistency by its innovations.
 pub fn consistency(innovations: &Innovations) -> String {
     if innovations.count == 0 {
         return "There is no reading, so there is nothing to compare the filter's predictions with.".into();

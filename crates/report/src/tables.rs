@@ -78,7 +78,7 @@ pub fn scores(rows: &[ScoreRow], quantity: Quantity, sample: Sample) -> Table {
     )
 }
 
-/// Everything in the sensor's file.
+/// Lists all parameters in the sensor's file.
 pub fn parameters(params: &SensorParams, rest_reading: f64) -> Vec<Table> {
     let mut tables = vec![law(params, rest_reading)];
     tables.extend(estimator(params));
@@ -100,7 +100,7 @@ struct Rows<'a> {
 }
 
 impl Rows<'_> {
-    /// The value that the filter runs with, and what is told of it under its `path` in the sensor's file.
+    /// Adds the value that the filter runs with, and its uncertainty under its `path` in the sensor's file.
     fn fitted(&mut self, name: &str, path: &str, value: f64, unit: &str) {
         let place = self.uncertainty.and_then(|known| known.names.iter().position(|name| name == path));
         self.found.extend(place);
@@ -120,7 +120,7 @@ impl Rows<'_> {
     }
 }
 
-/// What recordings tell of a parameter; an interval that holds zero does not tell it.
+/// Formats a parameter as the recordings determine it; one whose interval holds zero is not determined.
 fn told(known: &Uncertainty, place: Option<usize>) -> String {
     let at = |values: &[f64]| place.and_then(|place| values.get(place).copied());
     match (at(&known.values), at(&known.standard_errors)) {

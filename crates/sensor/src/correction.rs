@@ -135,12 +135,12 @@ pub struct OwnedTriangle<T> {
 }
 
 impl<T: Real> OwnedTriangle<T> {
-    /// Of the entries on and above the diagonal.
+    /// Builds it from the entries on and above the diagonal.
     pub fn new(side: usize, entry: impl Fn(usize, usize) -> T) -> Self {
         Self { columns: stripes(side, entry).collect(), side }
     }
 
-    /// Of the rows of an upper triangle, one after the other.
+    /// Builds it from the rows of an upper triangle, one after the other.
     pub fn of_rows(entries: &[T]) -> Self {
         let side = side_of(entries.len());
         // Before row i stand i rows of side, side - 1, … entries.
@@ -152,7 +152,7 @@ impl<T: Real> OwnedTriangle<T> {
         &self.columns
     }
 
-    /// How many rows it has.
+    /// Returns the number of rows.
     pub const fn side(&self) -> usize {
         self.side
     }
@@ -213,7 +213,7 @@ pub struct OwnedProcess<T: 'static, const D: usize> {
 }
 
 impl<T: Real + 'static, const D: usize, const S: usize> OwnedCorrection<T, D, S> {
-    /// As it runs.
+    /// Borrows the correction in the form that runs.
     pub fn correction(&self) -> Correction<'_, T, D, S> {
         Correction {
             rows: self.rows.as_rows(),
@@ -228,7 +228,7 @@ impl<T: Real + 'static, const D: usize, const S: usize> OwnedCorrection<T, D, S>
         }
     }
 
-    /// In another precision.
+    /// Converts the correction to another precision.
     pub fn map<U: Real + 'static>(&self, number: impl Fn(T) -> U + Copy) -> OwnedCorrection<U, D, S> {
         OwnedCorrection {
             rows: self.rows.map(number),
@@ -267,7 +267,7 @@ pub fn standardised<const D: usize>(scales: &[InputScale<f64>; D], row: &[f64; D
 }
 
 impl<const D: usize, const S: usize> OwnedCorrection<f64, D, S> {
-    /// Of checked parameters; `inputs` are those of all rows, in order of time.
+    /// Builds the correction from checked parameters; `inputs` are those of all rows, in order of time.
     #[must_use]
     pub fn new(params: &CorrectorParams, inputs: &[[f64; D]], limits: RangeParams) -> Self {
         let scales = params.inputs.to_core();
@@ -313,7 +313,7 @@ impl<const D: usize> OwnedProcess<f64, D> {
 }
 
 impl OwnedSimulated<f64, FILTER_INPUTS> {
-    /// Of checked parameters; `scales` are those of the correction, whose range simulated rows extend.
+    /// Builds it from checked parameters; `scales` are those of the correction, whose range simulated rows extend.
     pub(crate) fn new(params: &SimulatedParams, scales: &[InputScale<f64>; FILTER_INPUTS]) -> Self {
         let inputs: Vec<_> = params.rows.iter().map(|past| filter_inputs(&[0.0; OUTPUTS], past)).collect();
         let mut wider = *scales;

@@ -6,14 +6,14 @@ use crate::params::estimator::{EstimatorKind, NoParameters};
 use crate::params::law::MOST_BRANCHES;
 use crate::params::validate::FieldError;
 
-/// Why no filter can be made of a sensor's parameters.
+/// Reason for having no filter of a sensor's parameters.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SensorError {
     /// A number that no sensor can have.
     #[error("{0}")]
     Field(#[from] FieldError),
-    /// None for the estimator that is asked for.
+    /// No parameters for the requested estimator.
     #[error("{0}")]
     NoParameters(#[from] NoParameters),
     /// A parameter that the model refuses.
@@ -25,13 +25,13 @@ pub enum SensorError {
     /// More branches than filters are built for.
     #[error("a law with {found} branches; at most {MOST_BRANCHES} are supported")]
     Branches {
-        /// How many.
+        /// Number that was found.
         found: usize,
     },
     /// An estimator of phases without their durations.
     #[error("`{}` needs `phases` in its parameters", kind.name())]
     NoPhases {
-        /// Which.
+        /// Kind of estimator.
         kind: EstimatorKind,
     },
 }

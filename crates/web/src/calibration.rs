@@ -14,21 +14,21 @@ use crate::json::{json, refused};
 use crate::recording::Recording;
 use crate::sensor::Sensor;
 
-/// Fewer rows than this say nothing.
+/// Least number of rows for a score.
 const FEWEST_ROWS: usize = 10;
 
-/// What is left to choose; each has a default.
+/// Choices of a calibration; each has a default.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 struct Choices {
     estimator: Option<String>,
     branches: Option<usize>,
     gauge: Option<String>,
-    /// Whether a reference that is late is moved.
+    /// True if a late reference is to be moved.
     align: bool,
     from: Option<f64>,
     until: Option<f64>,
-    /// What messages call the sensor's file.
+    /// Name of the sensor's file in messages.
     file: Option<String>,
 }
 
@@ -68,7 +68,7 @@ pub fn estimator(name: &str) -> Result<EstimatorKind, String> {
     })
 }
 
-/// What comes of a calibration.
+/// Result of a calibration.
 #[wasm_bindgen]
 pub struct Calibrated {
     sensor: ohmstrain::Sensor,
@@ -157,7 +157,7 @@ fn no_rows(whole: &Recording, choices: &Choices) -> String {
     )
 }
 
-/// The sensor behind recordings: rows that nobody can trust are left out first, and doubts are answered.
+/// Calibrates a sensor on recordings: untrustworthy rows are left out first, and doubts are answered.
 fn of_recordings(
     recordings: &[Recording],
     calibration: Calibration,
@@ -209,7 +209,7 @@ fn known<'a>(recordings: &'a [Recording], samples: &[Samples<'a>]) -> Result<Vec
     recordings.iter().zip(samples).map(known).collect()
 }
 
-/// Says where a calibration is.
+/// Reports the stage of a calibration.
 fn tell(progress: Option<&Function>, stage: Stage) {
     let Some(progress) = progress else { return };
     let (words, share) = match stage {
@@ -261,17 +261,17 @@ impl Calibrated {
         json(&self.lines)
     }
 
-    /// What to record next, the most important first.
+    /// Returns the advice on the next recordings, the most important first.
     pub fn advice(&self) -> Vec<String> {
         self.advice.clone()
     }
 
-    /// What casts doubt on it.
+    /// Returns the warnings that cast doubt on it.
     pub fn warnings(&self) -> Vec<String> {
         self.warnings.clone()
     }
 
-    /// Whether it is better than a static curve, by more than chance makes it; undefined if nobody knows.
+    /// True if it is better than a static curve, by more than chance; undefined if that is unknown.
     #[wasm_bindgen(getter, js_name = isBetter)]
     pub fn is_better(&self) -> Option<bool> {
         self.is_better

@@ -44,7 +44,7 @@ pub fn warn_of_distrusted(recordings: &[Recording], rows: &[Distrusted], warning
     }
 }
 
-/// Says how late a reference is, and moves it if that is wanted; by how much, s. One that is certainly too late is an error.
+/// Reports the lag of a reference, and moves it if `align`; returns the lag by which it was moved, s. A lag that is certainly too large is an error.
 pub fn on_one_clock(recording: &mut Recording, align: bool, warnings: &mut Vec<String>) -> Result<f64, String> {
     let samples = recording.samples()?;
     let known = ohmstrain::Recording::new(samples.time_s(), samples.reading(), samples.strain());

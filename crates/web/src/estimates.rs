@@ -34,14 +34,14 @@ impl Estimates {
         self.columns.get(index).map_or_else(Vec::new, numbers)
     }
 
-    /// As `estimates.csv`.
+    /// Returns them in the form of `estimates.csv`.
     pub fn csv(&self) -> Result<Vec<u8>, JsError> {
         let mut bytes = Vec::new();
         self.write(&mut bytes).map_err(refused)?;
         Ok(bytes)
     }
 
-    /// What casts doubt on them.
+    /// Returns the warnings that cast doubt on them.
     pub fn warnings(&self) -> Vec<String> {
         self.warnings.clone()
     }
@@ -100,7 +100,7 @@ pub fn smoothed(sensor: &Sensor, recording: &Recording) -> Result<Estimates, Str
     Ok(made(&sensor, recording, rows))
 }
 
-/// How many rows are looked at first.
+/// Returns the number of rows that are looked at first.
 fn first_rows(recording: &Recording) -> usize {
     let is_known = |row: &usize| recording.trace.readings.values[*row].is_finite();
     let enough = (0..recording.trace.len()).filter(is_known).nth(FIRST_READINGS - 1);

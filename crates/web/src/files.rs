@@ -35,7 +35,7 @@ impl Files {
         Ok(())
     }
 
-    /// What stands in them, and the recording or the question that follows. `said` are flags of `ohmstrain import`, as a
+    /// Inspects the files: their contents, and the recording or the question that follows. `said` are flags of `ohmstrain import`, as a
     /// shell takes them.
     pub fn inspect(&self, said: &str) -> Result<Inspection, JsError> {
         let recipe = said::recipe(said).map_err(refused)?;

@@ -37,7 +37,7 @@ impl Firmware {
         self.lines.clone()
     }
 
-    /// What of the filter is exported, in words.
+    /// Describes the part of the filter that is exported, in words.
     #[wasm_bindgen(getter)]
     pub fn words(&self) -> String {
         self.words.clone()

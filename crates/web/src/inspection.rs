@@ -1,4 +1,4 @@
-//! What stands in a lab's files, in structures and in the words of `ohmstrain inspect`.
+//! Contents of a lab's files, in structures and in the words of `ohmstrain inspect`.
 
 use ohmstrain_bench_data::import::{ImportError, Imported, Plan, Recipe, Role, Survey, Table, candidates};
 use serde::Serialize;
@@ -16,17 +16,17 @@ pub struct Proposal {
     pub is_trace: bool,
 }
 
-/// What was found in files: a recording, or a question.
+/// Findings in files: a recording, or a question.
 #[wasm_bindgen]
 pub struct Inspection {
     pub(crate) tables: Vec<Table>,
     pub(crate) found: Result<Proposal, Asked>,
 }
 
-/// What is to be answered first.
+/// Question to be answered first.
 #[derive(Debug, Serialize)]
 pub struct Asked {
-    /// In one line, as the command line has it.
+    /// Question in one line, as on the command line.
     text: String,
     /// Flags that answer it; none of what is no question.
     answers: Vec<String>,
@@ -58,7 +58,7 @@ struct Described<'a> {
     files: Vec<DescribedFile<'a>>,
     question: Option<&'a Asked>,
     remarks: &'a [String],
-    /// Flags that say all of the plan.
+    /// Flags for all of the plan.
     flags: String,
     is_trace: bool,
     roles: Vec<DescribedRole>,
@@ -81,9 +81,9 @@ struct DescribedFile<'a> {
 struct DescribedColumn<'a> {
     heading: &'a str,
     unit: &'a str,
-    /// What it was taken for, and in which unit.
+    /// Role that was chosen for it, and its unit.
     taken: Option<(&'static str, String)>,
-    /// What it may be.
+    /// Role that it may have.
     candidate: Option<&'static str>,
     first: &'a str,
     last: &'a str,
@@ -105,7 +105,7 @@ impl Inspection {
         })
     }
 
-    /// What there is to know of the recording: names and sentences, as `ohmstrain inspect` prints them.
+    /// Returns the survey of the recording: names and sentences, as `ohmstrain inspect` prints them.
     #[wasm_bindgen(unchecked_return_type = "[string, string][]")]
     pub fn survey(&self) -> Result<JsValue, JsError> {
         let lines = self.found.as_ref().map(|found| Survey::new(&found.imported).lines());

@@ -1,7 +1,7 @@
 //! ohmstrain in WebAssembly: the facade, the importer, the report and the firmware export, for pages and Node.
 //!
 //! # Policy
-//! - No mathematics: what is computed is computed by the crates that the command line is made of, in the same order, so that
+//! - No mathematics: all results are computed by the crates that the command line is made of, in the same order, so that
 //!   files and numbers are those of the command line to the last digit.
 //! - Errors are JavaScript's, in the words of the command line. After one, what was called is as it was before.
 //! - Nothing here opens files or asks a server. Bytes come in, bytes and numbers go out.

@@ -8,7 +8,7 @@ use wasm_bindgen::prelude::*;
 use crate::calibration::estimator;
 use crate::json::{json, refused};
 
-/// How a filter is to be; each has a default.
+/// Options of a filter; each has a default.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, rename_all = "camelCase", deny_unknown_fields)]
 pub struct Wishes {
@@ -19,7 +19,7 @@ pub struct Wishes {
 }
 
 impl Wishes {
-    /// Of an object, or of nothing.
+    /// Parses the options from an object, or from nothing.
     pub fn of(value: &JsValue) -> Result<Self, String> {
         if value.is_undefined() || value.is_null() {
             return Ok(Self::default());
@@ -73,12 +73,12 @@ impl Filter {
         Ok(self.columns.iter().flat_map(|column| rows.iter().map(|row| column.number(row))).collect())
     }
 
-    /// Tells a strain that is known now, and its standard deviation: 0 at rest.
+    /// Takes a known strain, and its standard deviation: 0 at rest.
     pub fn know(&mut self, strain: f64, sd: f64) -> Result<(), JsError> {
         self.filter.know(strain, sd).map(|_| ()).map_err(refused)
     }
 
-    /// Tells what the rested sensor reads now.
+    /// Sets the present reading of the rested sensor.
     #[wasm_bindgen(js_name = restResistance)]
     pub fn rest_resistance(&mut self, measured: f64) -> Result<(), JsError> {
         self.filter.rest_resistance(measured).map_err(refused)

@@ -13,7 +13,7 @@ use crate::json::refused;
 #[derive(Clone)]
 pub struct Recording {
     pub(crate) name: String,
-    /// What messages call its header: name and line.
+    /// Name of its header in messages: file and line.
     pub(crate) header: String,
     pub(crate) bytes: Vec<u8>,
     pub(crate) sha256: String,
@@ -73,7 +73,7 @@ impl Recording {
         })
     }
 
-    /// As calibration wants it.
+    /// Returns it in the form that calibration takes.
     pub(crate) fn samples(&self) -> Result<Samples<'_>, String> {
         let none = "expected a reference (strain, displacement_mm or angle_deg), found none";
         let Some(reference) = &self.trace.reference else {
@@ -119,7 +119,7 @@ impl Recording {
         }
     }
 
-    /// Some of its rows, by their times.
+    /// Returns some of its rows, by their times.
     pub(crate) fn between(&self, from_s: Option<f64>, until_s: Option<f64>) -> Self {
         let row_at = |time_s: f64| self.trace.time_s.partition_point(|earlier_s| *earlier_s < time_s);
         let end = until_s.map_or(self.trace.len(), row_at);
@@ -182,7 +182,7 @@ impl Recording {
         self.trace.reference.as_ref().map(|reference| reference.values.clone())
     }
 
-    /// What the reference measures: `strain` or `angle_deg`.
+    /// Returns the quantity of the reference: `strain` or `angle_deg`.
     #[wasm_bindgen(getter, js_name = quantity)]
     pub fn quantity_name(&self) -> Option<String> {
         self.quantity().map(|quantity| quantity.name().to_owned())

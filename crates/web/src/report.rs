@@ -104,7 +104,7 @@ fn score(recording: &Recording, estimate: impl Fn(usize) -> (f64, Option<f64>)) 
     ohmstrain_calib::score(&(0..recording.trace.len()).map(row).collect::<Vec<_>>())
 }
 
-/// Whether its rows were calibrated on, by the times that a sensor has of each recording.
+/// Tells if its rows were calibrated on, by the times that a sensor has of each recording.
 fn sample(recording: &Recording, params: &SensorParams) -> Sample {
     let of_it = params.recordings.iter().filter(|info| info.sha256 == recording.sha256);
     let seen = |time_s: &&f64| of_it.clone().any(|info| (info.first_s..=info.last_s).contains(*time_s));

@@ -1,11 +1,11 @@
-//! What is said of files: the flags of `ohmstrain import`, as a shell takes them.
+//! Answers about files: the flags of `ohmstrain import`, as a shell takes them.
 
 use std::fmt::Display;
 use std::str::FromStr;
 
 use ohmstrain_bench_data::import::{Recipe, Role};
 
-/// The recipe that flags say.
+/// Parses the recipe from flags.
 pub fn recipe(flags: &str) -> Result<Recipe, String> {
     let words = shlex::split(flags).ok_or("expected flags with closing quotes, found an open one")?;
     let mut recipe = Recipe::default();

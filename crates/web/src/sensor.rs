@@ -18,7 +18,7 @@ use crate::stream::Stream;
 #[derive(Clone)]
 pub struct Sensor {
     sensor: ohmstrain::Sensor,
-    /// What its calibration said, if it was made here.
+    /// Facts about its calibration, if it was made here.
     facts: Vec<(&'static str, String)>,
     tested: Option<Tested>,
 }
@@ -56,7 +56,7 @@ impl Sensor {
         self.sensor.to_toml().map_err(|error| refused(format!("cannot write parameters: {error}")))
     }
 
-    /// What it estimates and reads, and how.
+    /// Describes its quantity, its readings and its estimators.
     #[wasm_bindgen(unchecked_return_type = "SensorDescription")]
     pub fn described(&self) -> Result<JsValue, JsError> {
         let params = self.sensor.params();
@@ -115,7 +115,7 @@ impl Sensor {
         firmware::of(self.sensor.params(), target, dt_s, budget.as_deref(), prefix.as_deref()).map_err(refused)
     }
 
-    /// The same sensor with another default estimator.
+    /// Returns the sensor with another default estimator.
     #[wasm_bindgen(js_name = withEstimator)]
     pub fn with_estimator(&self, name: &str) -> Result<Sensor, JsError> {
         let kind = estimator(name).map_err(refused)?;

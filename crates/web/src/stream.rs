@@ -14,7 +14,7 @@ use crate::stream_lines::Lines;
 /// Readings of the last seconds, and how many, that tell what the rested sensor reads.
 const REST_S: f64 = 1.0;
 const LEAST_AT_REST: usize = 5;
-/// How well a rest is known, in spans of the limits: as a known strain of the command line.
+/// Standard deviation of a known rest, in spans of the limits: that of a known strain on the command line.
 const KNOWN_TO: f64 = 0.005;
 /// Readings that are looked at before their unit is doubted.
 const FIRST_READINGS: usize = 20;
@@ -48,7 +48,7 @@ struct Counts {
     restarts: u64,
 }
 
-/// What there is to say of a stream.
+/// Summary of a stream.
 #[derive(Serialize)]
 struct Said<'a> {
     counts: Counts,
@@ -233,7 +233,7 @@ impl Stream {
         Ok(out)
     }
 
-    /// What there is to say: counts, columns, the last message.
+    /// Returns the summary: counts, columns, the last message.
     #[wasm_bindgen(unchecked_return_type = "StreamSaid")]
     pub fn said(&self) -> Result<JsValue, JsError> {
         let mut metadata = self.lines.parser.metadata();
@@ -268,7 +268,7 @@ impl Stream {
         Ok(())
     }
 
-    /// Rows of a trace CSV since this was asked last.
+    /// Returns the rows of a trace CSV since the last call.
     pub fn recorded(&mut self) -> String {
         String::from_utf8(std::mem::take(&mut self.record)).unwrap_or_default()
     }

@@ -5,9 +5,9 @@ use ohmstrain_bench_data::{BadContent, Line, LineParser};
 /// Between lines that arrive at once, s: two digits above what is written.
 const LEAST_STEP_S: f64 = 1e-4;
 
-/// Where the times of lines come from.
+/// Source of the lines' times.
 enum Clock {
-    /// From the lines.
+    /// Times in the lines themselves.
     Own,
     /// A cell of the lines counts milliseconds.
     Milliseconds(usize),
@@ -22,7 +22,7 @@ pub struct Lines {
 }
 
 impl Lines {
-    /// Waits for a header unless it is said.
+    /// Waits for a header unless one is given.
     pub fn new(mut parser: LineParser, header: Option<&str>) -> Result<Self, String> {
         let Some(header) = header else { return Ok(Self { parser, clock: Clock::Own }) };
         let names: Vec<&str> = header.split(',').map(str::trim).collect();

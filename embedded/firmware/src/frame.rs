@@ -1,4 +1,4 @@
-//! What runs a filter on the target and measures it. Everything is reported as little-endian words on the host's
+//! Frame that runs a filter on the target and measures it. Everything is reported as little-endian words on the host's
 //! standard output: formatting numbers would bring code, and panics, that are no part of the filter.
 //!
 //! Words: codes, instructions of all steps, of the dearest step, of the conversion of all codes, worst stack of a step in

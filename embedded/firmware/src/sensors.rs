@@ -59,7 +59,7 @@ pub fn front_end<T: Scalar>() -> Result<Divider<T>, ParameterError> {
     Divider::new(T::of(10_000.0), SensorSide::Low, 12, T::one())
 }
 
-/// What a converter code says of R/R₀ - 1; `None` at the ends of the scale.
+/// Converts a converter code to R/R₀ - 1; `None` at the ends of the scale.
 #[inline(never)]
 pub fn to_reading<T: Scalar>(divider: &Divider<T>, code: u32) -> Option<Reading<T>> {
     match divider.read(code) {

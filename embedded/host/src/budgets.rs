@@ -36,7 +36,7 @@ impl Budgets {
         Ok(Self { table, same_compiler })
     }
 
-    /// Whether the programs were made by the compiler that the figures belong to.
+    /// True if the programs were made by the compiler that the figures belong to.
     pub fn same_compiler(&self) -> bool {
         self.same_compiler
     }
@@ -46,12 +46,12 @@ impl Budgets {
         value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64))
     }
 
-    /// What a program should reach one day.
+    /// Returns the aim for a figure of a program.
     pub fn aim(&self, program: &str, figure: &str) -> Option<f64> {
         self.number("aim", program, figure)
     }
 
-    /// By what factor a figure may be above the committed one.
+    /// Returns the factor by which a figure may be above the committed one.
     fn room(&self, figure: &str) -> f64 {
         match figure {
             "state_bytes" => 1.0,
@@ -62,7 +62,7 @@ impl Budgets {
         }
     }
 
-    /// Every figure above its budget, or without one, in words.
+    /// Lists every figure above its budget, or without one, in words.
     pub fn broken(&self, program: &str, figures: &Figures) -> Vec<String> {
         let mut broken = Vec::new();
         for (figure, value) in figures {
@@ -114,7 +114,7 @@ pub fn write(path: &Path, compiler: &str, programs: &[(&str, Figures)]) -> Resul
 mod tests {
     use super::{Budgets, Figures};
 
-    /// How many of these figures are too large for a program made by `compiler`.
+    /// Returns the number of these figures that are too large for a program made by `compiler`.
     fn broken(compiler: &str, figures: &[(&'static str, f64)]) -> usize {
         let budgets = "[measured]\ncompiler = \"ours\"\n[measured.ekf]\ninstructions = 1000\npanics = 0\n\
                        state_bytes = 36\nstrain_difference = 1e-6\n";

@@ -13,7 +13,7 @@ pub const SEED: u64 = 20_240_611;
 /// Substeps of one reading for the law's differential equation.
 const SUBSTEPS: usize = 20;
 
-/// What the body does: rest, a cycle of 4 s to 15 % and back, a ramp to 10 % and a hold.
+/// Returns the strain of the body: rest, a cycle of 4 s to 15 % and back, a ramp to 10 % and a hold.
 fn strain(time_s: f64) -> f64 {
     match time_s {
         t if t < 0.5 => 0.0,

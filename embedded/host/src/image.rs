@@ -1,4 +1,4 @@
-//! What is in a program's image: the code that a step can reach, and what must not be there.
+//! Content of a program's image: the code that a step can reach, and forbidden code.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::error::Error;
@@ -77,7 +77,7 @@ fn symbols(nm: &str) -> Result<(BTreeMap<u64, Function>, u64), Box<dyn Error>> {
     Ok((functions, codes))
 }
 
-/// Who calls whom, every call site once, by address of the functions; and who calls through a pointer.
+/// Returns the calls between functions, every call site once, by address; and the functions that call through a pointer.
 fn calls(disassembly: &str, functions: &BTreeMap<u64, Function>) -> (BTreeMap<u64, Vec<u64>>, Vec<u64>) {
     let (mut calls, mut indirect) = (BTreeMap::<u64, Vec<u64>>::new(), Vec::new());
     for line in disassembly.lines() {

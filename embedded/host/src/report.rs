@@ -60,7 +60,7 @@ pub fn update(root: &Path, images: &Path) -> Result<bool, Box<dyn Error>> {
     Ok(broken.is_empty())
 }
 
-/// What the compiler calls itself in the programs that it made.
+/// Returns the compiler's name for itself in the programs that it made.
 fn compiler(images: &Path) -> Result<String, Box<dyn Error>> {
     Ok(fs::read_to_string(images.join("compiler"))?.trim().to_owned())
 }
@@ -69,7 +69,7 @@ fn readme(root: &Path, table: &str) -> Result<String, Box<dyn Error>> {
     Ok(fs::read_to_string(root.join("host/src/introduction.md"))?.replace("{table}\n", table))
 }
 
-/// Every program, and in words what no budget allows.
+/// Measures every program, and lists in words what no budget allows.
 fn measure(root: &Path, images: &Path) -> Result<(Vec<Measured>, Vec<String>), Box<dyn Error>> {
     let csv = fs::read_to_string(root.join("vectors.csv"))?;
     let truth = column(&csv, TRUTH)?;
@@ -96,7 +96,7 @@ fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || a > b { a } else { b }
 }
 
-/// What no budget allows.
+/// Lists what no budget allows.
 fn forbidden(name: &str, run: &Run, image: &Image) -> Vec<String> {
     let mut found = Vec::new();
     for symbol in &image.soft_double {

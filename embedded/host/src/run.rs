@@ -1,9 +1,9 @@
-//! What a program reported; the layout is that of `firmware/src/frame.rs`.
+//! Report of a program; the layout is that of `firmware/src/frame.rs`.
 
 use std::error::Error;
 use std::path::Path;
 
-/// What a program counted and computed.
+/// Counts and results of a program.
 pub struct Run {
     /// Instructions of a step, mean over all readings.
     pub instructions: f64,

@@ -95,7 +95,7 @@ pub fn write(root: &Path) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Whether the files are what the generator makes.
+/// True if the files are what the generator makes.
 pub fn check(root: &Path) -> Result<bool, Box<dyn Error>> {
     let mut same = true;
     for (name, content) in generate()? {

@@ -127,18 +127,18 @@ pub(crate) fn weighted_moments<'a, T: Scalar, const N: usize, const L: usize>(
     (mean, covariance)
 }
 
-/// Where random numbers come from: ChaCha with eight rounds, the same on every machine.
+/// Source of random numbers: ChaCha with eight rounds, the same on every machine.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Chance(pub(crate) ChaCha8Rng);
 
 impl Chance {
-    /// From the standard normal distribution.
+    /// Draws from the standard normal distribution.
     pub(crate) fn normal<T: Scalar>(&mut self) -> T {
         let draw: f64 = StandardNormal.sample(&mut self.0);
         T::of(draw)
     }
 
-    /// From 0 to 1.
+    /// Draws uniformly from 0 to 1.
     pub(crate) fn uniform<T: Scalar>(&mut self) -> T {
         let draw: f64 = StandardUniform.sample(&mut self.0);
         T::of(draw)

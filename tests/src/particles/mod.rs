@@ -44,7 +44,7 @@ pub struct Particles<T, M> {
     seed: u64,
 }
 
-/// What one step of the particle filter computed.
+/// Result of one step of the particle filter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParticleStep<T, const N: usize, const L: usize> {
     /// The particles after the reading.

@@ -2,7 +2,7 @@ use ohmstrain_model::{Phase, Scalar};
 
 use crate::particles::cloud::{Chance, Particle, root_columns, weighted_moments};
 
-/// How far the kernel reaches, in deviations of the cloud; its shrinkage a = √(1 - h²) is 0.995, which is Liu and West's
+/// Width of the kernel, in deviations of the cloud; its shrinkage a = √(1 - h²) is 0.995, which is Liu and West's
 /// discount factor (3δ - 1)/(2δ) at δ = 0.99.
 const REACH: f64 = 0.1;
 

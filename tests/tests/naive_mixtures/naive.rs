@@ -10,7 +10,7 @@ use nalgebra::{SMatrix, SVector};
 use ohmstrain_ekf::{Belief, Dwell, Evidence, Reading};
 use ohmstrain_model::{Direction, Observation, Phase, StrainRange, SwitchedModel, Symmetric, Transition};
 
-/// Which filter.
+/// Kind of filter.
 #[derive(Clone, Copy, Debug)]
 pub enum Rule {
     /// Interacting multiple models.
@@ -26,9 +26,9 @@ pub enum Rule {
 pub struct Naive<const B: usize, const N: usize> {
     /// The sensor.
     pub model: SwitchedModel<f64, B, N>,
-    /// What it follows.
+    /// Kind of filter.
     pub rule: Rule,
-    /// What weighs hypotheses.
+    /// Evidence that weighs hypotheses.
     pub evidence: Evidence<f64>,
     /// The most hypotheses.
     pub room: usize,
@@ -37,11 +37,11 @@ pub struct Naive<const B: usize, const N: usize> {
 /// Mean and covariance.
 pub type Moments<const N: usize> = (SVector<f64, N>, SMatrix<f64, N, N>);
 
-/// How a child came to be.
+/// Origin of a child.
 #[derive(Clone, Copy, Debug)]
 struct Descent<const N: usize> {
     parent: usize,
-    /// From the parent's state to the prediction, and the noise that this adds; a rate that is drawn anew is noise.
+    /// Transition from the parent's state to the prediction; a rate that is drawn anew is noise.
     jacobian: SMatrix<f64, N, N>,
     predicted: Moments<N>,
     posterior: Moments<N>,
@@ -73,7 +73,7 @@ pub struct Hypotheses<const N: usize> {
     open: bool,
 }
 
-/// What a step says of the reading.
+/// Comparison of a step with the reading.
 #[derive(Clone, Copy, Debug)]
 pub struct Said {
     /// Reading less its mean, and its variance.
@@ -165,7 +165,7 @@ struct Compared(f64, f64, f64, f64);
 struct Children<const N: usize> {
     kept: Vec<Hypothesis<N>>,
     room: usize,
-    /// Every child beside the reading.
+    /// All children beside the reading.
     compared: Vec<Compared>,
 }
 

@@ -1,5 +1,5 @@
 //! Recordings of sensors, wires, converters and clocks that fail: a fault is put into a recording from a time on, and the
-//! reference says what the strain was all the same.
+//! reference keeps the true strain.
 //!
 //! A fault is a kind with its severity; an [`Episode`] adds when it begins, when it ends, and a seed. Readings are changed in
 //! place; an episode of a clock changes times, or adds or moves rows together with their reference.
@@ -20,7 +20,7 @@ mod readings;
 
 use crate::trace::Trace;
 
-/// What goes wrong, and how much.
+/// Kind and size of a fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Fault {
@@ -55,12 +55,12 @@ pub enum Fault {
     },
     /// A wire is off: readings far too high.
     UnpluggedHigh {
-        /// What is read then, in the readings' unit.
+        /// Value that is read then, in the readings' unit.
         reading: f64,
     },
     /// A short circuit: readings far too low.
     UnpluggedLow {
-        /// What is read then, in the readings' unit.
+        /// Value that is read then, in the readings' unit.
         reading: f64,
     },
     /// Contacts add a resistance.
@@ -97,7 +97,7 @@ pub enum Fault {
     },
     /// The sensor has slipped: the body's strain is more than the sensor's by this.
     Slipped {
-        /// In the reference's unit.
+        /// Offset, in the reference's unit.
         by: f64,
     },
     /// The clock runs so many times too fast.
@@ -136,11 +136,11 @@ impl Fault {
 /// A fault with its time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Episode {
-    /// What goes wrong.
+    /// Kind and size of the fault.
     pub fault: Fault,
-    /// From when on, s.
+    /// Start, s.
     pub from_s: f64,
-    /// Until when, s; infinite for a fault that stays.
+    /// End, s; infinite for a fault that stays.
     pub until_s: f64,
     /// Equal seeds give equal episodes.
     pub seed: u64,

@@ -1,6 +1,6 @@
 use crate::error::{BadContent, Fault};
 
-/// Why files do not become a trace. Each is one line.
+/// Reason why files do not become a trace. Each is one line.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImportError {
@@ -12,7 +12,7 @@ pub enum ImportError {
     Unreadable {
         /// Name of the file.
         file: String,
-        /// What is wrong with it.
+        /// Problem with it.
         what: String,
     },
     /// Something that the files leave open.
@@ -20,7 +20,7 @@ pub enum ImportError {
     Question {
         /// Name of the file.
         file: String,
-        /// What is open.
+        /// Question that is open.
         what: String,
         /// Flags that answer it, as a shell takes them.
         answers: Vec<String>,

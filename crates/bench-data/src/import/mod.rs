@@ -1,4 +1,4 @@
-//! From a lab's files to a trace: what stands in them, which questions that leaves, and the import itself.
+//! Import of a lab's files as a trace: their contents, the questions that these leave open, and the import itself.
 //!
 //! ```text
 //! bytes ──► table ──► roles ──► series ──► trace        each uses those before it and, but for bytes, `words`
@@ -9,13 +9,13 @@
 //! ```
 //!
 //! # Policy
-//! - Nothing is guessed in silence: what follows from names, units or numbers stands in [`Plan::remarks`]; what does not
-//!   follow is an [`ImportError::Question`], one line that shows how to answer it.
-//! - A plan's own recipe leads to the same plan: `Plan::new(tables, &plan.recipe())` asks nothing.
+//! - No guess is silent: a conclusion from names, units or numbers is in [`Plan::remarks`]; an open question
+//!   is an [`ImportError::Question`], one line that shows how to answer it.
+//! - A plan's own recipe leads to the same plan: `Plan::new(tables, &plan.recipe())` has no question.
 //! - Numbers are read as they are written: powers of ten between units move the decimal mark, so that nothing is rounded
 //!   twice. Cells that no instrument means as a number (`OVLD`, `N/A`, 9.9e37) are missing values, and are counted.
-//! - What a file is unpacked to, or repeats, is bounded (`bounds`), and counted before there is room made for it.
-//! - Nothing here opens files.
+//! - The unpacked size of a file, and its repetitions, are bounded (`bounds`), and counted before memory is allocated.
+//! - No function here opens files.
 
 mod bytes;
 mod error;

@@ -99,7 +99,7 @@ fn disturbed(settings: &SimulationSettings, profile: &Profile, rest_ohm: f64, tr
     truth.iter().map(resistance).collect()
 }
 
-/// What is recorded of the resistance: itself, to 1 mΩ, or what a front end makes of it.
+/// Returns the recorded readings: the resistance itself, to 1 mΩ, or a front end's conversion of it.
 fn readings(settings: &SimulationSettings, resistance_ohm: Vec<f64>) -> Result<Readings, SettingsError> {
     let Some(spec) = &settings.front_end else {
         let values = resistance_ohm.iter().map(|ohm| round(*ohm, 1e3)).collect();

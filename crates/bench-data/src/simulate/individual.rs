@@ -2,9 +2,9 @@ use rand_chacha::ChaCha8Rng;
 
 use super::noise::{Stream, normal, random};
 
-/// By how much R₀ differs between sensors of one make: standard deviation of its logarithm.
+/// Spread of R₀ between sensors of one make: standard deviation of its logarithm.
 pub(super) const REST_SPREAD: f64 = 0.2;
-/// The same of what makes a sensor's character. Illustrative: hand-made sensors of one batch differ by about that much.
+/// Spread of a sensor's character between sensors of one make. Illustrative: hand-made sensors of one batch differ by about that much.
 pub(super) const CHARACTER_SPREAD: f64 = 0.15;
 
 /// One sensor of a make.
@@ -15,7 +15,7 @@ impl Individual {
         Self(seed.map(|seed| random(seed, Stream::Individual)))
     }
 
-    /// What to multiply the make's next number with: log-normal with this spread, 1 for the make itself.
+    /// Returns the factor on the make's next number: log-normal with this spread, 1 for the make itself.
     pub(super) fn factor(&mut self, spread: f64) -> f64 {
         self.0.as_mut().map_or(1.0, |random| (spread * normal(random)).exp())
     }

@@ -6,7 +6,7 @@ const CROSS_SECTION_MM2: f64 = 17.5;
 /// Weight of one gram, N.
 const NEWTON_PER_GRAM: f64 = 9.806_65e-3;
 
-/// What the simulated sensor is made of, with 1:9 carbon black.
+/// Material of the simulated sensor, with 1:9 carbon black.
 ///
 /// The moduli are the makers'; the electrical parameters are *illustrative*, chosen within these ranges of published
 /// findings: R/R₀ between 1.33 and 1.52 at ε = 0.3, a 290 s hold that loses about a tenth of R with time constants of
@@ -26,7 +26,7 @@ pub enum Material {
 }
 
 impl Material {
-    /// Those that are made after published findings.
+    /// Materials after published findings.
     pub const ALL: [Self; 3] = [Self::Ecoflex0030, Self::Ecoflex0050, Self::Vytaflex10];
 
     /// The name used in files and flags.

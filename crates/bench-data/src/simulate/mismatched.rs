@@ -17,21 +17,21 @@ const DRIVE_RATE: f64 = 0.1;
 const CEILING: f64 = 2.0;
 /// Half-widths of the play operators.
 const PLAY_STRAINS: [f64; PLAYS] = [0.01, 0.03, 0.08];
-/// How slowly the largest strain so far leaves a resistance behind, s.
+/// Time constant with which the largest strain so far leaves a resistance behind, s.
 const MEMORY_TIME_S: f64 = 150.0;
 
-/// In what mismatched sensors differ.
+/// Character of a mismatched sensor.
 #[derive(Clone, Copy)]
 struct Character {
-    /// Of the quasi-static curve.
+    /// Slope and peak of the quasi-static curve.
     gauge_slope: f64,
     gauge_peak: f64,
-    /// On all time constants, and the slowest of them before that, s.
+    /// Factor on all time constants, and the slowest of them before that, s.
     time_scale: f64,
     slowest_s: f64,
     /// Weights of the branches go as τ to this power: with -0.22 they relax together much like a stretched exponential.
     spectrum: f64,
-    /// On all that breaks conducting paths.
+    /// Factor on all that breaks conducting paths.
     breaking: f64,
     /// Common weight of the play operators.
     play_weight: f64,
@@ -154,7 +154,7 @@ impl Sensor for Mismatched {
     }
 }
 
-/// How strongly movement breaks conducting paths, per unit of strain: releasing from a large strain breaks most, which
+/// Returns the rate at which movement breaks conducting paths, per unit of strain: releasing from a large strain breaks most, which
 /// makes the peak on the way back.
 fn gain(strain: f64, phase: Phase) -> f64 {
     match phase {

@@ -4,19 +4,19 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::settings::{SettingsError, within};
 
-/// What disturbs the reading besides the sensor's own behaviour.
+/// Disturbances of the reading besides the sensor's own behaviour.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disturbances {
     /// Standard deviation of the white noise, share of R₀; usually 2e-4.
     pub white_sd: f64,
     /// Power spectral density of the 1/f drift of R at 1 Hz, 1/Hz, relative to R; usually 1e-8.
     pub drift_density: f64,
-    /// Whether the first cycles lower the resistance for good: by 1.9, 1.5, 1.0 and 0.3 %.
+    /// True if the first cycles lower the resistance for good: by 1.9, 1.5, 1.0 and 0.3 %.
     pub conditioning: bool,
 }
 
 impl Disturbances {
-    /// As measured on a bench.
+    /// Disturbances measured on a bench.
     pub const BENCH: Self = Self { white_sd: 2e-4, drift_density: 1e-8, conditioning: true };
     /// Nothing at all.
     pub const NONE: Self = Self { white_sd: 0.0, drift_density: 0.0, conditioning: false };
@@ -88,7 +88,7 @@ pub(super) fn normal(random: &mut ChaCha8Rng) -> f64 {
     StandardNormal.sample(random)
 }
 
-/// What cycles have changed for good, relative to R, after each of them.
+/// Permanent change by the cycles, relative to R, after each of them.
 const CONDITIONED: [f64; 5] = [0.0, -0.019, -0.034, -0.044, -0.047];
 
 /// The change after a number of full cycles, between which it goes in straight lines.

@@ -11,7 +11,7 @@ pub(super) struct Profile {
 }
 
 impl Profile {
-    /// What a protocol does. `random` is used by [`Protocol::LongHolds`] and [`Protocol::Mixed`] only.
+    /// Computes the strain of a protocol. `random` is used by [`Protocol::LongHolds`] and [`Protocol::Mixed`] only.
     pub(super) fn new(settings: &SimulationSettings, random: &mut ChaCha8Rng) -> Self {
         let (full, rate) = (settings.full_strain(), settings.strain_rate());
         let mut profile = Self { time_s: vec![0.0], strain: vec![0.0] };

@@ -4,20 +4,20 @@ use std::str::FromStr;
 /// Rest before the first movement, s: enough to see the resistance at rest.
 pub(super) const LEAD_IN_S: f64 = 2.0;
 
-/// What the bench does with the sensor.
+/// Movements of the bench.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Protocol {
     /// Stretch and release, again and again.
     ExtendRetract {
-        /// How often, at least once.
+        /// Number of cycles, at least one.
         cycles: u32,
         /// Rest after the last one, s.
         rest_s: f64,
     },
     /// Stretch, hold, release, rest.
     ExtendHold {
-        /// How often, at least once.
+        /// Number of repetitions, at least one.
         cycles: u32,
         /// Time at full stretch, s.
         hold_s: f64,
@@ -33,7 +33,7 @@ pub enum Protocol {
     },
     /// Stretch, hold for long, release, rest: the first time to full stretch, then to random strains at random speeds.
     LongHolds {
-        /// How often, at least once.
+        /// Number of repetitions, at least one.
         cycles: u32,
         /// Time at each stretch, s.
         hold_s: f64,
@@ -42,7 +42,7 @@ pub enum Protocol {
     },
     /// Triangles at several speeds, holds at several strains and a random walk, in turn: what a calibration should see.
     Mixed {
-        /// How long, s.
+        /// Duration, s.
         duration_s: f64,
     },
 }

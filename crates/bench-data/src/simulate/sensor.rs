@@ -23,9 +23,9 @@ impl Movement {
     }
 }
 
-/// What the bench stretches.
+/// Sensor that the bench stretches.
 pub(super) trait Sensor {
-    /// Goes through a movement.
+    /// Moves the sensor through a movement.
     fn advance(&mut self, movement: &Movement);
 
     /// R/R₀ - 1 at the end of the movement it went through last.

@@ -4,12 +4,12 @@ use crate::spec::FrontEndSpec;
 /// Longest simulated recording, rows: a slip of a digit must not fill the memory.
 const MOST_ROWS: f64 = 1e7;
 
-/// What to simulate.
+/// Settings of a simulation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SimulationSettings {
-    /// What the sensor is made of.
+    /// Material of the sensor.
     pub material: Material,
-    /// What the bench does with it.
+    /// Movements of the bench.
     pub protocol: Protocol,
     /// Full stretch, mm on 30 mm, above 0 and at most 15; default 10.
     pub elongation_mm: f64,
@@ -18,16 +18,16 @@ pub struct SimulationSettings {
     pub speed_mm_s: f64,
     /// Readings per second, 0.1 to 10 000; default 20.
     pub sample_rate_hz: f64,
-    /// Whether the sensor follows a law outside of the family that is fitted; default no.
+    /// True if the sensor follows a law outside of the family that is fitted; default false.
     pub mismatched: bool,
-    /// What disturbs the reading; default all of it.
+    /// Disturbances of the reading; default all of them.
     pub disturbances: Disturbances,
     /// The electronics that turn the resistance into codes; default none: the resistance itself is recorded.
     pub front_end: Option<FrontEndSpec>,
     /// Equal seeds give equal recordings; default 1.
     pub seed: u64,
-    /// Which sensor of the make, a seed too: its R₀ and, with `mismatched`, its character are drawn around the make's; default
-    /// none, the make's own.
+    /// Number of the sensor within the make, a seed too: its R₀ and, with `mismatched`, its character are drawn around the make's;
+    /// default `None`, the make's own.
     pub individual: Option<u64>,
 }
 
@@ -106,7 +106,7 @@ pub enum SettingsError {
         lowest: f64,
         /// Its largest value.
         highest: f64,
-        /// What it was.
+        /// Value of the setting.
         found: f64,
     },
     /// A front end that cannot be.

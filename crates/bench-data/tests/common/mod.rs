@@ -79,7 +79,7 @@ impl LongHold {
         self.curve.peak(self.start_s + 290.0..self.start_s + 290.0 + self.ramp_s)
     }
 
-    /// What R/R₀ - 1 is left after the rest.
+    /// Returns R/R₀ - 1 at the end of the rest.
     pub fn left(&self) -> f64 {
         self.curve.ratio[self.curve.ratio.len() - 1] - 1.0
     }

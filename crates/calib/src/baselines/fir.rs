@@ -16,7 +16,7 @@ pub struct Fir {
     recent: VecDeque<(f64, f64)>,
 }
 
-/// How far back the readings go, s.
+/// Length of the window of readings, s.
 const WINDOW_S: f64 = 20.0;
 /// Most readings on the grid.
 const MOST_TAPS: usize = 40;

@@ -1,7 +1,7 @@
 //! Inverses to compare the filter with: four without a model of the sensor, and the published law ([`PublishedLaw`]).
 //!
 //! [`Baselines::fit`] fits the four to recordings with known strain; each one then runs over readings row by row, as a
-//! filter does. What they say is clipped to the strains they were fitted on. Ridge and time constant come from
+//! filter does. Their estimates are clipped to the strains they were fitted on. Ridge and time constant come from
 //! cross-validation on contiguous blocks, on the same normal equations as the law's.
 
 mod fir;

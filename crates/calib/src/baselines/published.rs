@@ -21,11 +21,11 @@ pub type PhaseRows = (Phase, Range<usize>);
 
 /// The published law taken literally, equation 8 of NOTATION.md, solved for the strain: `R = R_s + r₀ exp(-t/τ₀) u + η v` in a
 /// movement, t, R_s and the way u since it began, at the constant speed `v = u/t` of the paper's ramps. In a hold its readings
-/// say nothing of the strain, which stays. Each direction has numbers of its own. On recordings τ₀ goes as 1/v: the exponential
-/// mostly stands for the bend of the gauge curve.
+/// carry no information on the strain, which stays. Each direction has numbers of its own. On recordings τ₀ goes as 1/v: the
+/// exponential mostly stands for the bend of the gauge curve.
 ///
-/// It is told when phases begin, and the strain of the first row, which no body that wears a sensor says: this is how far
-/// the law itself carries.
+/// It is given the times at which phases begin, and the strain of the first row, which are unknown on a worn sensor: the score is
+/// the best that the law itself allows.
 #[derive(Clone, Copy, Debug)]
 pub struct PublishedLaw {
     extend: Movement,
@@ -78,7 +78,7 @@ impl PublishedLaw {
         Ok(Self { extend, retract, range: RangeParams { lower, upper } })
     }
 
-    /// At work on a recording whose phases begin at these times, s, and whose first strain is known.
+    /// Starts on a recording whose phases begin at these times, s, and whose first strain is known.
     #[must_use]
     pub fn start(&self, phases: Vec<(f64, Phase)>, strain: f64) -> impl Baseline + use<> {
         let mut held = Held::new(self.range);

@@ -31,7 +31,7 @@ pub struct Regression<F> {
 }
 
 /// Ridges tried, for regressions with more features than the data need. A larger one would flatten a feature to less than
-/// half of what it says alone: a rival so weak is none, whatever few blocks of a short recording say.
+/// half of its effect alone: a rival so weak is none, whatever a few blocks of a short recording suggest.
 pub(super) const BASELINE_RIDGES: [f64; 7] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0];
 
 impl<F: Features> Regression<F> {

@@ -23,15 +23,15 @@ use ohmstrain_sensor::{
 pub(crate) const PAUSE_S: f64 = 1000.0;
 /// Rows that a correction learns from at most. With a hundred errors are a tenth larger, with four hundred no smaller.
 const ROWS: usize = 200;
-/// Rows of several recordings that teach what these say, at most. With twice as many errors are no smaller.
+/// Largest number of rows of several recordings whose information is used. With twice as many errors are no smaller.
 const ALL_ROWS: usize = 3000;
-/// How much of the choice of rows follows the way that the features go, rather than time: long holds are one row over and
+/// Weight of the path that the features travel, against time, in the choice of rows: long holds repeat one row over and
 /// over again.
 const BY_WAY: f64 = 0.8;
 
 /// Learns the correction of a filter from the recordings that it was calibrated on, whose law is `fit`; `recipe`
-/// says what the filter is made of, `corrects` names it. With a prior of that filter the rows of other sensors come first, and half as many
-/// of their own follow. None if nothing can be learned from them.
+/// is the filter's, `corrects` its kind. With a prior of that filter the rows of other sensors come first, and half as many
+/// of their own follow. Returns `None` if nothing can be learned from them.
 pub(crate) fn fit_correction(
     recordings: &[Samples],
     fit: &LawFit,
@@ -131,7 +131,7 @@ impl Columns {
 }
 
 impl AllOf {
-    /// Every so many rows of each recording; `None` of fewer than two.
+    /// Thins the rows of each recording by a stride; `None` for fewer than two recordings.
     fn several(candidates: &[TrainingRow], recordings: &[Range<usize>]) -> Option<Self> {
         let stride = candidates.len().div_ceil(ALL_ROWS).max(1);
         let thinned = |rows: &Range<usize>| candidates[rows.clone()].iter().step_by(stride).collect::<Vec<_>>();
@@ -153,7 +153,7 @@ impl AllOf {
 }
 
 impl CorrectorInputs {
-    /// Of rows that stand for no others.
+    /// Collects the inputs of rows that stand for no others.
     pub(crate) fn new(rows: &[TrainingRow]) -> Self {
         Self { few: Columns::new(rows.iter()), all: None, reference_sd: 0.0 }
     }

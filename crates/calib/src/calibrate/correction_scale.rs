@@ -104,7 +104,7 @@ mod tests {
         0.3 + 0.2 * (0.41 * time_s).sin() + 0.05 * (2.3 * time_s + 1.0).sin()
     }
 
-    /// What a low-pass of such readings is once its start is forgotten, by the integral over the past: amplitude
+    /// Returns a low-pass of such readings once its start is forgotten, by the integral over the past: amplitude
     /// 1/√(1 + (ωτ)²), phase −atan ωτ.
     fn low_passed(time_s: f64, tau_s: f64) -> f64 {
         let sine = |size: f64, omega: f64, phase: f64| {

@@ -52,12 +52,12 @@ fn white_variance(x: &[f64]) -> f64 {
     median(squares).map_or(0.0, |median| median / (6.0 * CHI_SQUARE_MEDIAN))
 }
 
-/// Which way the body moves in a row; zero at rest.
+/// Direction of the body's motion in a row; zero at rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Direction(i8);
 
 impl Direction {
-    /// Of every row of a recording.
+    /// Returns the direction in every row of a recording.
     pub(crate) fn of_rows(samples: &Samples) -> Vec<Self> {
         let rate = moving_mean(&central_rate(samples.time_s, &filled_strain(samples)));
         let speeds = sorted(rate.iter().map(|v| v.abs()));

@@ -1,4 +1,4 @@
-//! What a calibration is worth on parts of the recordings that it was not fitted to, what it has seen, and what limits it.
+//! Quality of a calibration on held-out parts of the recordings, its calibrated range, and the limits of its accuracy.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -42,7 +42,7 @@ pub(crate) fn seen(recordings: &[Samples], range: RangeParams, stats: &MotionSta
     }
 }
 
-/// What the scores of the quarters left out are made of.
+/// Inputs of the scores on held-out quarters.
 pub(crate) struct Check<'a> {
     pub recordings: &'a [Samples<'a>],
     pub fit: &'a CrossFit,
@@ -51,11 +51,11 @@ pub(crate) struct Check<'a> {
     pub filter: EstimatorKind,
     /// Noise and motion, that of the estimator and of what smooths in its place among them.
     pub estimators: &'a BTreeMap<EstimatorKind, EstimatorParams>,
-    /// What other sensors of the make tell the correction.
+    /// Prior on the correction from other sensors of the make.
     pub of_make: Option<&'a CorrectionPrior>,
 }
 
-/// What was estimated in a row of a quarter by what was fitted to the others.
+/// Estimate in a row of a quarter by a fit to the other quarters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LeftOutRow {
     /// The recording, counted from 0.
@@ -79,7 +79,7 @@ struct Scored {
     filter: Vec<ScoredRow>,
     smoother: Vec<ScoredRow>,
     static_cubic: Vec<ScoredRow>,
-    /// Which way the body moves, what the filter says of the rate, and the error of its strain, row by row of the filter's.
+    /// Direction of the body's motion, the filter's direction, and the error of its strain, row by row of the filter's.
     directions: Vec<(Direction, f64, f64)>,
 }
 

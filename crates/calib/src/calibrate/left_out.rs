@@ -31,7 +31,7 @@ pub(crate) struct Fold<'a> {
     pub rest_reading: f64,
 }
 
-/// By how much a reading is said to fall, by a law that has not seen it.
+/// Predicted fall of a reading, by a law that has not seen it.
 pub(crate) struct SaidFall {
     pub recording: usize,
     pub row: usize,
@@ -117,7 +117,7 @@ impl<'a> LeftOut<'a> {
         self.of_rows(build, |strain, truth| truth.deviation(strain))
     }
 
-    /// The same for the smoother of whole recordings; `None` if the estimator has none.
+    /// Returns the same for the smoother of whole recordings; `None` if the estimator has none.
     pub(crate) fn smoothed_deviations(&self, build: &Build) -> Option<Vec<Vec<f64>>> {
         let of_run = |run: &Run| {
             let mut smoother = build(run.fold).smoother(None).ok()?;
@@ -128,8 +128,8 @@ impl<'a> LeftOut<'a> {
         self.runs.par_iter().map(of_run).collect()
     }
 
-    /// What a filter says in `rows` of each recording, in order, by how much readings will fall; `None` if it fails. Only where no
-    /// row was left out for a stride.
+    /// Returns a filter's predictions in `rows` of each recording, in order, of the fall of the readings; `None` if it fails. Valid only
+    /// if no row was left out for a stride.
     pub(crate) fn falls(&self, build: &Build, rows: &[Vec<usize>]) -> Option<Vec<SaidFall>> {
         let mut falls = Vec::new();
         for run in &self.runs {
@@ -150,8 +150,8 @@ impl<'a> LeftOut<'a> {
         Some(falls)
     }
 
-    /// What estimate and true strain of every row of every block come to, block by block: the filter runs from the first row to the end
-    /// of the block. `None` if it fails.
+    /// Applies `of` to estimate and true strain in every row of every block, block by block: the filter runs from the first row to the end
+    /// of the block. Returns `None` if it fails.
     fn of_rows(&self, build: &Build, of: impl Fn(Gaussian<f64>, Truth) -> f64 + Sync) -> Option<Vec<Vec<f64>>> {
         let of_run = |run: &Run| {
             let mut filter = build(run.fold).filter(None).ok()?;

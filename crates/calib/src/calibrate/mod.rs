@@ -1,5 +1,5 @@
-//! From recordings with known strain to a sensor: the law, noise and motion of its filters, the correction, and what it all is
-//! worth on quarters left out.
+//! Calibration of a sensor from recordings with known strain: the law, noise and motion of its filters, the correction, and their
+//! quality on held-out quarters.
 
 pub(crate) mod correction_fit;
 pub(crate) mod correction_scale;
@@ -41,7 +41,7 @@ use ohmstrain_sensor::{
     ReadingUnit, SensorParams, Sessions, StaticCubic, Summary, Uncertainty, Validity,
 };
 
-/// What calibration is doing, for a progress bar.
+/// Stage of a calibration, for a progress bar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
     /// Fitting the law.
@@ -66,26 +66,26 @@ pub struct Calibration {
     pub law: LawParams,
     /// R₀ of each recording.
     pub rest_readings: Vec<f64>,
-    /// What the rested sensor reads over R₀, if a recording begins at rest.
+    /// Reading of the rested sensor over R₀, if a recording begins at rest.
     pub rest_share: Option<f64>,
-    /// What the recordings tell of the law's parameters: without the ridge, as [`identifiability`] has it; `None` if they
-    /// tell nothing without it.
+    /// Uncertainty of the law's parameters given the recordings: without the ridge, as in [`identifiability`]; `None` if they
+    /// are not determined without it.
     pub uncertainty: Option<Uncertainty>,
     /// The estimator that did best.
     pub default_estimator: EstimatorKind,
     /// Noise and motion, per estimator.
     pub estimators: BTreeMap<EstimatorKind, EstimatorParams>,
-    /// What was learned about the error of the filter that is corrected, if that was asked for.
+    /// Learned correction of the filter, if one was asked for.
     pub correction: Option<CorrectionParams>,
     /// The range of the reference.
     pub limits: RangeParams,
-    /// What was seen.
+    /// Calibrated range.
     pub validity: Validity,
     /// Differences between recordings; `None` unless several begin at rest.
     pub sessions: Option<Sessions>,
     /// The static inverse fitted to the same rows.
     pub static_cubic: StaticCubic,
-    /// What it is worth on parts that it was not fitted to; `None` if they cannot be estimated.
+    /// Quality on held-out parts; `None` if they cannot be estimated.
     pub findings: Option<Findings>,
     /// The rows of those parts; none if they cannot be estimated.
     pub left_out: Vec<LeftOutRow>,
@@ -127,7 +127,7 @@ fn median_rest(rest_readings: &[f64]) -> f64 {
     median(rest_readings.iter().copied()).unwrap_or(f64::NAN)
 }
 
-/// How much better, in mean log density of the strain, a single Gaussian must be than hypotheses: once it has taken the
+/// Margin, in mean log density of the strain, by which a single Gaussian must be better than hypotheses: once it has taken the
 /// wrong direction it does not come back, and a short recording may not show that. Ten per cent in the deviation.
 const LOCK_IN: f64 = 0.1;
 
@@ -135,13 +135,13 @@ fn handicap(kind: EstimatorKind) -> f64 {
     if kind.has_phases() { 0.0 } else { LOCK_IN }
 }
 
-/// Calibrates law, noise and motion on recordings with known strain. Deterministic: same samples, same result. Rows that
-/// stand far from their neighbours, or from the law, take no part ([`screen`]).
+/// Calibrates law, noise and motion on recordings with known strain. Deterministic: same samples, same result. Outliers, and rows
+/// far from the law, take no part ([`screen`]).
 ///
 /// Estimators are tried with a law for each of `structures` and each strength of ridge; the pair with the best score on
 /// blocks that the law has not seen gives the law. Every one of them, and the extended Kalman filter in any case, is then
 /// fitted to that law, and the best of `kinds` by every row of those blocks becomes the default. Near ties go to the one that keeps
-/// hypotheses. [`EstimatorKind::Corrected`] is the default where it is asked for; what it corrects is the best of its candidates, and
+/// hypotheses. [`EstimatorKind::Corrected`] is the default if it is requested; it corrects the best of its candidates, and
 /// is learned last, from the same rows.
 ///
 /// # Errors
@@ -223,9 +223,9 @@ pub(crate) fn calibrate_once(
 
 /// Estimators that a calibration is to try.
 struct Asked<'a> {
-    /// By the caller, for themselves.
+    /// Estimators that the caller asked for themselves.
     named: Vec<EstimatorKind>,
-    /// To be corrected: the best of them is.
+    /// Candidates for the correction: the best of them is corrected.
     candidates: &'a [EstimatorKind],
 }
 

@@ -26,12 +26,12 @@ pub(crate) struct Search {
     rows: usize,
 }
 
-/// Says how well an estimator does with a law.
+/// Search that measures the quality of an estimator with a law.
 pub(crate) const SURVEY: Search = Search { side: 0.7, steps: 100, rows: 500 };
 
-/// Says how well it does with another law, from what the one before has led to.
+/// Search that measures the quality with another law, starting from the result with the law before.
 const RESURVEY: Search = Search { side: 0.4, steps: 25, rows: 500 };
-/// Goes on from the best survey.
+/// Search that refines the best survey.
 pub(crate) const REFINEMENT: Search = Search { side: 0.3, steps: 45, rows: 1500 };
 
 impl Search {
@@ -59,7 +59,7 @@ const SHARE_OF_RESIDUAL: f64 = 0.3;
 /// First guess of the tempering: model error is correlated from reading to reading.
 const TEMPERING: f64 = 0.7;
 
-/// What an estimator makes of a law.
+/// Result of an estimator with a law.
 pub(crate) struct Surveyed<'a> {
     pub kind: EstimatorKind,
     pub law: &'a CrossFit,
@@ -97,12 +97,12 @@ pub(crate) fn best_of_each_size<'a>(surveyed: &[Surveyed<'a>]) -> Vec<&'a CrossF
     best.into_values().map(|one| one.law).collect()
 }
 
-/// Where a search has got to.
+/// State of a search.
 #[derive(Clone, Debug)]
 pub(crate) struct Tuned {
     /// Logarithms of the parameters.
     point: Vec<f64>,
-    /// What was minimised.
+    /// Minimised cost.
     pub cost: f64,
 }
 
@@ -114,7 +114,7 @@ pub(crate) struct NoiseProblem<'a> {
     limits: RangeParams,
     stats: MotionStats,
     kind: EstimatorKind,
-    /// What other sensors of the make tell.
+    /// Prior from other sensors of the make.
     of_make: Option<&'a EstimatorPrior>,
     /// Logarithms of the parameters that residuals and motion suggest, or those sensors.
     untuned: Vec<f64>,
@@ -128,7 +128,7 @@ impl<'a> NoiseProblem<'a> {
         problem
     }
 
-    /// The same with a prior of noise and motion.
+    /// Adds a prior of noise and motion.
     pub(crate) fn with_prior(self, of_make: Option<&'a EstimatorPrior>) -> Self {
         let same_size = of_make.filter(|prior| prior.ln_mean.len() == self.untuned.len());
         match same_size {
@@ -137,7 +137,7 @@ impl<'a> NoiseProblem<'a> {
         }
     }
 
-    /// What keeps a search near where it starts.
+    /// Returns the penalty that keeps a search near its start.
     fn pull(&self, point: &[f64]) -> f64 {
         let flat = || point.iter().zip(&self.untuned).map(|(x, untuned)| (x - untuned).powi(2)).sum::<f64>();
         self.of_make.map_or_else(|| REGULARISATION * flat(), |prior| prior.pull(point, self.stats.longest_s))
@@ -207,7 +207,7 @@ impl<'a> NoiseProblem<'a> {
         }
     }
 
-    /// What holds say of the filter, block by block.
+    /// Returns the settling of the filter in the holds, block by block.
     fn settling(&self, left_out: &LeftOut, params: EstimatorParams) -> Option<SettlingParams> {
         let holds = LongHolds::new(self.samples, self.limits.span())?;
         let params = EstimatorParams { settling: Some(holds.law()), ..params };
@@ -285,7 +285,7 @@ impl<'a> NoiseProblem<'a> {
     }
 }
 
-/// Every how manieth row to take so that no more than `rows` are left.
+/// Returns the stride that leaves no more than `rows` rows.
 pub(crate) fn stride(samples: &[Samples], rows: usize) -> usize {
     samples.iter().map(Samples::len).sum::<usize>().div_ceil(rows)
 }

@@ -1,12 +1,12 @@
 use ohmstrain_sensor::EstimatorKind;
 
-/// What the default estimator is made of.
+/// Components of the default estimator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Recipe {
     /// The filters to choose from, by how well each does on every row of blocks that the law has not seen. The first one is tried
     /// under every law, the others under the laws that serve it best, and only where the body rests for a tenth of the time or more.
     pub filters: &'static [EstimatorKind],
-    /// The estimator that is calibrated, and made the default, unless another one is asked for: the filter with its strain
+    /// Default estimator, which is calibrated unless another one is requested: the filter with its strain
     /// corrected, or as it is.
     pub estimator: EstimatorKind,
 }

@@ -56,7 +56,7 @@ pub fn score(rows: &[ScoredRow]) -> Option<Scores> {
     })
 }
 
-/// The same where errors can be told in percent of full scale; `None` if the truth is constant or an estimate is no number.
+/// Returns the scores if errors have a value in percent of full scale; `None` if the truth is constant or an estimate is NaN.
 pub(crate) fn score_of_full_scale(rows: &[ScoredRow]) -> Option<Scores> {
     score(rows).filter(|scores| scores.rmse_percent_fs.is_finite())
 }

@@ -1,4 +1,4 @@
-//! How far readings fall in the holds of a calibration, against what the law says.
+//! Fall of the readings in the holds of a calibration, against the law's prediction.
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -10,7 +10,7 @@ use ohmstrain_sensor::SettlingParams;
 
 /// Holds shorter than this share of the longest are left out: they end before the others.
 const LEAST_SHARE: f64 = 1.0 / 3.0;
-/// One hold says nothing of the next one.
+/// Least number of holds: one hold carries no information on the next one.
 const FEWEST_HOLDS: usize = 2;
 /// Rows of a hold are looked at from its first seconds to these before its end, in equal steps of the logarithm of time.
 const FIRST_S: f64 = 2.0;
@@ -23,9 +23,9 @@ const RATIOS: (u32, f64, f64) = (30, 0.1, 100.0);
 
 /// A row of a hold.
 struct Fall {
-    /// By how much its reading is above the last one.
+    /// Reading minus the last one of the hold.
     read: f64,
-    /// By how much the law says that it is to fall.
+    /// Fall predicted by the law.
     said: f64,
 }
 
@@ -35,12 +35,12 @@ pub(crate) struct LongHolds {
     count: usize,
     /// Rows of each recording that are looked at, in order.
     rows: Vec<Vec<usize>>,
-    /// By how much their readings are above the last one of their hold.
+    /// Their readings minus the last one of their hold.
     read: Vec<Vec<f64>>,
 }
 
 impl LongHolds {
-    /// Of recordings whose strains have a range of `span`; `None` if there are not enough of them.
+    /// Collects the long holds of recordings whose strains have a range of `span`; `None` if there are not enough of them.
     pub(crate) fn new(recordings: &[Samples], span: f64) -> Option<Self> {
         let every: Vec<Vec<Hold>> = recordings.iter().map(|samples| holds(samples, span, LEAST_HOLD_S)).collect();
         let longest_s = every.iter().flatten().map(|hold| hold.duration_s).reduce(f64::max)?;
@@ -56,15 +56,15 @@ impl LongHolds {
         Some(Self { longest_s, count, rows, read })
     }
 
-    /// For filters that are to say all that branches relax by within the longest hold.
+    /// Returns the settling of filters that report the full relaxation of the branches within the longest hold.
     pub(crate) const fn law(&self) -> SettlingParams {
         SettlingParams { horizon_s: self.longest_s, share: 1.0, share_sd: 0.0, sd: 0.0 }
     }
 
-    /// What they say; `None` if a filter fails. `build` makes filters with [`Self::law`].
+    /// Estimates the settling; `None` if a filter fails. `build` makes filters with [`Self::law`].
     ///
-    /// The share is that of least squares, the deviations are those under which the errors are likeliest. Errors of one hold
-    /// are alike, so that the number of holds says how far another hold may be off: Student's t.
+    /// The share is that of least squares, the deviations are those of maximum likelihood. Errors within one hold
+    /// are alike, so that the number of holds determines the uncertainty for another hold: Student's t.
     pub(crate) fn settling(&self, left_out: &LeftOut, build: &Build) -> Option<SettlingParams> {
         let fall = |of: SaidFall| {
             let place = self.rows[of.recording].binary_search(&of.row).ok()?;
@@ -106,7 +106,7 @@ fn likeliest(falls: &[Fall], count: usize, horizon_s: f64) -> SettlingParams {
     SettlingParams { horizon_s, share, share_sd: ratio * sd / usual, sd }
 }
 
-/// How many times wider an interval must be whose deviation was told by so many holds.
+/// Returns the factor on an interval whose deviation was estimated from that many holds.
 fn widened(count: usize) -> f64 {
     let count = count as f64;
     let quantile = |t: StudentsT| t.inverse_cdf(0.975);
@@ -118,7 +118,7 @@ fn widened(count: usize) -> f64 {
 mod tests {
     use super::{Fall, likeliest, widened};
 
-    /// Two of three of what is said comes true, with errors of 10 % of it in turn, and of 0.001 where nothing is said.
+    /// Tests a share of two thirds of the predicted fall, with errors of 10 % of it in turn, and of 0.001 where no fall is predicted.
     #[test]
     fn share_and_deviations_are_found() {
         let fall = |k: u32| {

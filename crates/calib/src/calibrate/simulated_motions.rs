@@ -13,7 +13,7 @@ use crate::law::structure::LawFit;
 use crate::motion_stats::MotionStats;
 use ohmstrain_sensor::{CorrectionScale, RangeParams};
 
-/// How many motions are simulated, for how long, and how much of each is left out, while low-passes forget its beginning.
+/// Number of simulated motions, their length, and the beginning of each that is left out while low-passes forget it.
 const MOTIONS: usize = 24;
 const LASTS_S: f64 = 600.0;
 const FORGOTTEN_S: f64 = 20.0;
@@ -26,7 +26,7 @@ pub const SIMULATED_SEED: u64 = 1;
 const ROWS: usize = 4000;
 /// Spread of R₀ from one day to another, as a logarithm.
 const REST_SPREAD: f64 = 0.1;
-/// For how long the law errs alike, s.
+/// Correlation time of the law's error, s.
 const ERROR_TIME_S: f64 = 10.0;
 /// Mean speeds, in median and in fastest speeds of the calibration; the slowest in fastest ones at least.
 const SLOWEST: f64 = 0.3;
@@ -112,8 +112,8 @@ fn ramp(from: f64, to: f64, step: f64) -> impl Iterator<Item = f64> {
     (1..=steps).map(move |k| from + (to - from) * k as f64 / steps as f64)
 }
 
-/// What the law reads, with an error like that on blocks left out, and with an R₀ of another day. The law is exact for strain that
-/// moves linearly between rows.
+/// Returns the law's readings, with an error like that on held-out blocks, and with an R₀ of another day. The law is exact for strain
+/// that changes linearly between rows.
 fn readings(fit: &LawFit, strain: &[f64], step_s: f64, rng: &mut ChaCha12Rng) -> Vec<Option<Reading<f64>>> {
     let law = &fit.law;
     let gauge = law.gauge.to_model();

@@ -1,4 +1,4 @@
-/// Where on a recording a law is asked for its reading. What a law does not use may be zero.
+/// Place on a recording for which a law predicts its reading. Values that a law does not use may be zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Moment {
     /// Time since the phase began, s.
@@ -9,23 +9,23 @@ pub struct Moment {
     pub rate: f64,
     /// Strain ε.
     pub strain: f64,
-    /// In a hold: the movement that led to it, where one is known.
+    /// Movement that led to a hold, if one is known.
     pub before: Option<Movement>,
 }
 
 /// A whole movement, as seen from the hold after it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Movement {
-    /// How long it took, s.
+    /// Duration, s.
     pub duration_s: f64,
-    /// How far it went, in strain.
+    /// Change of strain.
     pub travel: f64,
 }
 
 /// One reading and where it was taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Datum {
-    /// Where.
+    /// Place on the recording.
     pub at: Moment,
     /// Reading, Ω or a ratio.
     pub reading: f64,

@@ -38,7 +38,7 @@ struct Problem<'a> {
     linear: usize,
 }
 
-/// Where a descent ended.
+/// End point of a descent.
 struct End {
     cost: f64,
     theta: Vec<f64>,

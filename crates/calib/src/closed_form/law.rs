@@ -12,7 +12,7 @@ pub enum Unit {
     Second,
     /// 1/s.
     PerSecond,
-    /// That of the reading.
+    /// Unit of the reading.
     Reading,
     /// Reading per strain.
     ReadingPerStrain,
@@ -25,7 +25,7 @@ pub enum Unit {
 }
 
 impl Unit {
-    /// As text, given the units of reading and strain, `1` for a pure number.
+    /// Returns it as text, given the units of reading and strain, `1` for a pure number.
     #[must_use]
     pub fn text(self, reading: &str, strain: &str) -> String {
         let over = |top: &str, bottom: &str| if bottom == "1" { top.to_string() } else { format!("{top}/{bottom}") };
@@ -81,7 +81,7 @@ pub trait SeparableLaw {
     /// The θ.
     fn nonlinear(&self) -> Vec<Parameter>;
 
-    /// Where to look for each θ, given what the data span.
+    /// Returns the search ranges of all θ, given the extent of the data.
     fn search(&self, extent: &Extent) -> Vec<Search>;
 
     /// Writes φⱼ to `values[j]` and ∂φⱼ/∂θₖ to `slopes[j * θ.len() + k]`. Both come filled with zeros.
@@ -134,7 +134,7 @@ pub(super) fn sort_terms(weights: &mut [f64], taus: &mut [f64]) {
     }
 }
 
-/// Why a law was not fitted.
+/// Reason for not fitting a law.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ClosedFormError {

@@ -6,8 +6,8 @@
 //! # Policy
 //! - Every law is a weighted sum of functions that have few parameters of their own ([`SeparableLaw`]). The weights are
 //!   eliminated, so only time constants and their like are searched.
-//! - A parameter that the data do not tell has no standard error (`None`) instead of an enormous or a tiny one.
-//! - Standard errors take residuals for white. [`ClosedFormFit::residual_autocorrelation`] says how far they are from it.
+//! - A parameter that the data do not determine has no standard error (`None`) instead of an enormous or a tiny one.
+//! - Standard errors take residuals for white. [`ClosedFormFit::residual_autocorrelation`] measures the deviation from that.
 
 mod catalogue;
 mod datum;

@@ -93,9 +93,9 @@ impl SeparableLaw for Moving {
 }
 
 /// Equation 9, a hold: `R′ = r₀′ R₀ E(t) + r₁′`, where R₀ is the reading at the start of the hold, so that continuity
-/// asks `r₁′ = R₀ (1 - r₀′)`: `R′ = R₀ + Σ r₀′ R₀ Eᵢ (exp(-t/τᵢ) - 1)`.
+/// requires `r₁′ = R₀ (1 - r₀′)`: `R′ = R₀ + Σ r₀′ R₀ Eᵢ (exp(-t/τᵢ) - 1)`.
 ///
-/// A hold does not tell a floor of the modulus from `1 - r₀′`; with one, only `r₀′ Eᵢ` and the settled reading are known.
+/// A hold cannot separate a floor of the modulus from `1 - r₀′`; with one, only `r₀′ Eᵢ` and the settled reading are known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Hold {
     /// The modulus E(t).

@@ -20,7 +20,7 @@ pub struct Extent {
 }
 
 impl Extent {
-    /// Of data in the order of their times.
+    /// Measures the extent of data in the order of their times.
     pub(super) fn of(data: &[Datum]) -> Self {
         let steps = data.windows(2).map(|pair| pair[1].at.elapsed_s - pair[0].at.elapsed_s);
         let largest = |value: fn(&Datum) -> f64| data.iter().map(value).fold(0.0, f64::max);
@@ -33,7 +33,7 @@ impl Extent {
         }
     }
 
-    /// Where to look for `count` time constants, s, that may change places.
+    /// Returns the search ranges of `count` time constants, s, that may change places.
     #[must_use]
     pub fn time_constants(&self, count: usize) -> Vec<Search> {
         // A start beyond the duration or below the step would begin where the data say little.
@@ -50,7 +50,7 @@ impl Extent {
         (0..count).map(|i| Search { above_previous: i > 0, ..search.clone() }).collect()
     }
 
-    /// The same as rates, 1/s.
+    /// Returns the search ranges of `count` rates, 1/s.
     #[must_use]
     pub fn rates(&self, count: usize) -> Vec<Search> {
         let inverse = |search: Search| Search {
@@ -63,7 +63,7 @@ impl Extent {
     }
 }
 
-/// Where to look for one nonlinear parameter.
+/// Search range of one nonlinear parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Search {
     /// Smallest value.
@@ -102,7 +102,7 @@ impl Search {
     }
 }
 
-/// Every combination of starts.
+/// Returns every combination of starts.
 pub(super) fn starts(searches: &[Search]) -> Vec<Vec<f64>> {
     let mut out = vec![Vec::new()];
     for search in searches {

@@ -5,8 +5,8 @@ use super::law::{Parameter, SeparableLaw};
 use super::projection::Projection;
 use super::search::Search;
 
-/// Directions whose singular value is below this share of the largest are not told by the data: the square root of the
-/// rounding error, beyond which the variance itself is rounding.
+/// Threshold on a singular value, as a share of the largest, below which the data do not determine its direction: the square root of
+/// the rounding error, beyond which the variance itself is rounding.
 const TOLD: f64 = 1.5e-8;
 /// A parameter has no standard error if its share of an untold direction is above this.
 const INVOLVED: f64 = 1e-3;
@@ -45,11 +45,11 @@ pub struct ClosedFormFit {
     pub r_squared: f64,
     /// Akaike's criterion `n (ln(2π sum/n) + 1) + 2 k`, k = p + 1 with the variance.
     pub aic: f64,
-    /// The same corrected for short records, `+ 2 k (k + 1) / (n - k - 1)`; infinite where that is not positive.
+    /// Akaike's criterion corrected for short records, `+ 2 k (k + 1) / (n - k - 1)`; infinite where that is not positive.
     pub aicc: f64,
     /// Bayesian criterion, with `k ln n` in place of `2 k`.
     pub bic: f64,
-    /// Correlation of neighbouring residuals. Near 0, standard errors are what they say; near 1 they are too small, by
+    /// Correlation of neighbouring residuals. Near 0, standard errors are right; near 1 they are too small, by
     /// about `√((1 + ρ) / (1 - ρ))`.
     pub residual_autocorrelation: f64,
     /// Condition of the Jacobian with columns of length one.

@@ -1,10 +1,10 @@
-//! By what the settings of a process are chosen.
+//! Criterion by which the settings of a process are chosen.
 
 use super::gaussian_process::{BLOCKS, BlockLeftOut, GaussianProcess};
 
-/// Criterion that settings are chosen by: the larger, the better. Rows lie closer together in time than their errors hang together,
-/// so that marginal likelihood alone takes what neighbours share for what the inputs say: little noise, short length scales. A block
-/// that was left out has no such neighbours.
+/// Criterion that settings are chosen by: the larger, the better. Rows are closer in time than the correlation time of their errors,
+/// so that marginal likelihood alone mistakes the common errors of neighbours for a function of the inputs: little noise, short length
+/// scales. A held-out block has no such neighbours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Criterion {
     /// The densities of rows without their blocks, each by itself.
@@ -47,7 +47,7 @@ impl LeftOutCosts {
 #[derive(Clone, Copy, Default)]
 struct NormalSum {
     count: usize,
-    /// Of errors over the root of their covariance.
+    /// Sum of squared errors over the root of their covariance.
     squares: f64,
     half_log_determinants: f64,
 }

@@ -9,7 +9,7 @@ pub(super) const BLOCKS: usize = 5;
 pub(super) const WHITE: f64 = 0.09;
 /// Variance that keeps the equations regular, in variances of the targets.
 const JITTER: f64 = 1e-6;
-/// A pivot of the inducing rows below this share of the prior variance says nothing new.
+/// Smallest pivot of the inducing rows, as a share of the prior variance, that adds information.
 const SMALLEST_PIVOT: f64 = 1e-6;
 
 /// Hyper-parameters of a Gaussian process.
@@ -60,7 +60,7 @@ pub(crate) struct LeftOutRow {
 pub(super) struct BlockLeftOut {
     /// Its first row.
     pub start: usize,
-    /// Targets less what the other rows say, in their standard deviations.
+    /// Targets less the prediction from the other rows, in their standard deviations.
     pub errors: DVector<f64>,
     /// The inverse of their covariance, for a prior variance of 1.
     pub precision: Cholesky<f64, Dyn>,
@@ -100,7 +100,7 @@ impl GaussianProcess {
         Some(Self { centre, size, scale, noise, kernel, covariance, weights, targets })
     }
 
-    /// Up to a constant, with the scale that makes it least.
+    /// Returns the negative log evidence up to a constant, with the scale that minimises it.
     pub(super) fn negative_log_evidence(&self) -> f64 {
         let n = self.targets.len() as f64;
         let half_log_determinant: f64 = self.covariance.l_dirty().diagonal().iter().map(|pivot| pivot.ln()).sum();
@@ -136,7 +136,7 @@ impl GaussianProcess {
         Some(rows)
     }
 
-    /// Each block as the rows of the others say it, in order; none if a covariance is not positive definite.
+    /// Predicts each block from the rows of the others, in order; `None` if a covariance is not positive definite.
     pub(super) fn blocks_left_out(&self, blocks: usize) -> Option<Vec<BlockLeftOut>> {
         let n = self.targets.len();
         let triangle = self.covariance.l_dirty();
@@ -188,7 +188,7 @@ fn noise_covariance(time_s: &[f64], params: &Settings) -> DMatrix<f64> {
     })
 }
 
-/// A symmetric matrix; `entry` is asked for those of the lower triangle.
+/// Builds a symmetric matrix; `entry` is called for the lower triangle.
 pub(super) fn symmetric(n: usize, entry: impl Fn(usize, usize) -> f64) -> DMatrix<f64> {
     let mut matrix = DMatrix::zeros(n, n);
     for j in 0..n {
@@ -200,7 +200,7 @@ pub(super) fn symmetric(n: usize, entry: impl Fn(usize, usize) -> f64) -> DMatri
     matrix
 }
 
-/// The rows that say most about all others, by a pivoted Cholesky decomposition of a kernel (Fine & Scheinberg, *J. Mach.
+/// Selects the rows that carry most information on all others, by a pivoted Cholesky decomposition of a kernel (Fine & Scheinberg, *J. Mach.
 /// Learn. Res.* 2 (2001) 243): at most `most`, fewer if the others add nothing.
 pub(crate) fn inducing_rows(kernel: &DMatrix<f64>, most: usize) -> Vec<usize> {
     let n = kernel.nrows();

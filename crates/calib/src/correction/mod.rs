@@ -21,14 +21,14 @@ use gaussian_process::{inducing_rows, kernel_of};
 use prepared::{Choosing, Conditioned, seen};
 pub(crate) use prepared::{Chosen, Prepared};
 
-/// Significant digits of weights: kernels of a few hundred rows have conditions up to 1e6, and what they say is to have six digits.
+/// Significant digits of weights: kernels of a few hundred rows have conditions up to 1e6, and predictions are to have six digits.
 const WEIGHT_DIGITS: usize = 12;
 /// Significant digits of what inducing rows explain, a share of the variance.
 const EXPLAINED_DIGITS: usize = 9;
 /// The processes of a corrector.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Choices {
-    /// Factor on the standard deviation of what they say together.
+    /// Factor on the standard deviation of their joint prediction.
     pub sd_scale: f64,
     pub direct: Chosen,
     pub residual: Chosen,
@@ -62,7 +62,7 @@ pub(crate) fn smoother_corrector(examples: Examples<SMOOTHER_INPUTS>) -> Option<
 }
 
 impl Choices {
-    /// With S one-sided processes; `last` is what is mixed in last of every row, if anything is.
+    /// Chooses the processes, S one-sided ones among them; `last` is mixed in last in every row, if given.
     pub(crate) fn fit<const D: usize, const S: usize>(prepared: &Prepared<D>, last: &[Gaussian<f64>]) -> Option<Self> {
         let chosen = |kind: ProcessKind| prepared.chosen(kind, Choosing::of_sides(S));
         let both = || rayon::join(|| chosen(ProcessKind::Direct), || chosen(ProcessKind::Residual));
@@ -73,7 +73,7 @@ impl Choices {
         Some(Self { sd_scale: of.scale_of::<_, S>(prepared, last)?, ..of })
     }
 
-    /// The factor on the deviation of what its processes say together.
+    /// Returns the factor on the deviation of its processes' joint prediction.
     fn scale_of<const D: usize, const S: usize>(&self, prepared: &Prepared<D>, last: &[Gaussian<f64>]) -> Option<f64> {
         let said = |kind: ProcessKind| prepared.left_out(kind, self.of(kind)?);
         let (direct, residual) = (said(ProcessKind::Direct)?, said(ProcessKind::Residual)?);

@@ -13,9 +13,9 @@ use super::sparse::{Population, Sums};
 use crate::order::extent;
 use crate::sd_scale::{joint_scale_of, sd_scale_up_to};
 
-/// Where nothing is known, the variance of the strain that the direct process leaves, and of the filter's error that the
-/// residual process leaves, in variances of the strain. The targets' own variances, of a filter that has seen the rows,
-/// promise too much for other motions.
+/// Least prior variance of the strain after the direct process, and of the filter's error after the residual process, in
+/// variances of the strain. The targets' own variances, of a filter that has seen the rows, promise too much for other
+/// motions.
 const LEAST_DIRECT: f64 = 0.5;
 const LEAST_RESIDUAL: f64 = 0.07;
 /// Multiples of all length scales, and noises in deviations of the targets, that are tried on recordings left out.
@@ -34,7 +34,7 @@ pub(crate) struct Chosen {
     pub sd_scale: f64,
 }
 
-/// How the processes of a corrector are chosen.
+/// Options for choosing the processes of a corrector.
 #[derive(Clone, Copy)]
 pub(super) struct Choosing {
     pub(super) criterion: Criterion,
@@ -110,7 +110,7 @@ impl<'a, const D: usize> Prepared<'a, D> {
         self.strain_variance * least_variance(kind)
     }
 
-    /// Lets `learn` see the examples of a process.
+    /// Calls `learn` with the examples of a process.
     fn taught<X>(&self, (kind, places): (ProcessKind, &[usize]), learn: impl Fn(Lessons) -> Option<X>) -> Option<X> {
         let (inputs, targets) = (seen(places, &self.rows), targets(kind, self.examples.inputs, self.examples.strain));
         learn(Lessons { inputs: &as_slices(&inputs), targets: &targets, time_s: self.examples.time_s })
@@ -180,13 +180,13 @@ impl<'a, const D: usize> Prepared<'a, D> {
         Some(rows.into_iter().enumerate().map(said).collect())
     }
 
-    /// Errors of what is said of judged rows, in units of their deviations, block by block.
+    /// Returns the errors of the predictions of judged rows, in units of their deviations, block by block.
     fn deviations(&self, said: &[Gaussian<f64>]) -> Vec<Vec<f64>> {
         let of_row = |k: usize| (said[k].mean - self.judged.strain[k]).hypot(self.examples.reference_sd) / said[k].sd();
         self.judged.blocks.iter().map(|block| block.clone().map(of_row).collect()).collect()
     }
 
-    /// The factor on the deviation of what is said of judged rows that makes intervals right, beside what is mixed in last.
+    /// Returns the factor on the deviation of the predictions of judged rows that makes intervals right, beside the voice mixed in last.
     pub(super) fn scale_beside(&self, said: &[Gaussian<f64>], last: &[Gaussian<f64>]) -> f64 {
         joint_scale_of(|scale| {
             let scaled = |said: &Gaussian<f64>| Gaussian { variance: said.variance * scale.powi(2), ..*said };

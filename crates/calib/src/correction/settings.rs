@@ -12,8 +12,8 @@ use super::gaussian_process::{GaussianProcess, Lessons, Settings, symmetric};
 const LENGTHS: [f64; 3] = [2.0, 4.0, 8.0];
 const NOISES: [f64; 3] = [0.03, 0.1, 0.3];
 const NOISE_TIMES_S: [f64; 2] = [2.0, 10.0];
-/// After that each input but the first, on which the linear part of the kernel depends, finds a length scale of its own, in
-/// steps of this factor, in turn, and once again.
+/// Factor between length scales that are tried for one input. After the common length scale each input but the first, on which the
+/// linear part of the kernel depends, finds a length scale of its own, in steps of this factor, in turn, and once again.
 const STRETCH: f64 = 2.0;
 const TURNS: usize = 2;
 /// Prior of a length scale over that of all inputs: log-normal, with this factor for a standard deviation; and its limits.
@@ -28,7 +28,7 @@ impl Lessons<'_> {
         self.alike(criterion).map(|(cost, params)| self.with_relevance(criterion, cost, params))
     }
 
-    /// With one length scale of all inputs.
+    /// Chooses the settings with one length scale for all inputs.
     fn alike(self, criterion: Criterion) -> Option<(f64, Settings)> {
         let inputs = self.inputs.first()?.len();
         let squares = self.half_squares(&vec![1.0; inputs]);
@@ -67,7 +67,7 @@ impl Lessons<'_> {
         criterion.cost(&GaussianProcess::with_sums(self, sums, params)?)
     }
 
-    /// The same with another length scale of one input.
+    /// Returns the sums with another length scale of one input.
     fn stretched(self, sums: &DMatrix<f64>, input: usize, from: f64, to: f64) -> DMatrix<f64> {
         let change = relevance(to) - relevance(from);
         let apart = |i: usize, j: usize| self.inputs[i][input] - self.inputs[j][input];

@@ -14,7 +14,7 @@ use super::prepared::{Prepared, scale};
 use super::weight;
 use crate::digits::digits;
 
-/// Rows that stand for all others. Two hundred say no more.
+/// Rows that stand for all others. Two hundred carry no more information.
 const ROWS: usize = 64;
 /// Length scale of all inputs, in their standard deviations.
 const LENGTH: f64 = 4.0;
@@ -30,7 +30,7 @@ const FIRST_NOISE: f64 = 0.1;
 pub(crate) struct SimulatedRow {
     /// Features of the readings up to this row.
     pub past: [f64; FEATURES],
-    /// The strain, or what is said of it.
+    /// True strain, or its estimate.
     pub strain: f64,
 }
 
@@ -100,8 +100,8 @@ fn kernels(a: &[&[f64]], b: &[&[f64]]) -> DMatrix<f64> {
 }
 
 impl Prepared<'_, FILTER_INPUTS> {
-    /// The process of simulated rows. What it says errs as it did in simulation, where the law is right, and, since it is not, as
-    /// it does in the worst block of the rows that it is judged on.
+    /// Learns the process of simulated rows. Its error is that in simulation, if the law is right, and, since it is not, that
+    /// in the worst block of the rows that it is judged on.
     pub(crate) fn simulated(&self, of: &Distilled) -> Option<SimulatedParams> {
         let rows: Vec<[f64; FEATURES]> = of.rows.iter().map(|row| row.past).collect();
         let standardised = self.simulated_rows(&rows);
@@ -159,8 +159,8 @@ mod tests {
     const D: usize = FILTER_INPUTS;
     const LIMITS: RangeParams = RangeParams { lower: -2.0, upper: 2.0 };
 
-    /// Sixty-four rows say what four thousand say, with the error that is stated: two features of seven within ±1.7, in a kernel four
-    /// wide. One that errs in a block of the calibration's rows says so of all.
+    /// Tests that sixty-four rows stand for four thousand, with the stated error: two features of seven within ±1.7, in a kernel four
+    /// wide. An error in one block of the calibration's rows widens the stated error for all.
     #[test]
     fn few_rows_stand_for_all_and_state_their_error() {
         let (real, known) = rows(100, 7);

@@ -16,7 +16,7 @@ use super::gaussian_process::{LeftOutRow, WHITE};
 
 /// Standard deviation of a recording's offset, in those of the targets.
 const OFFSET: f64 = 0.25;
-/// For how long errors are alike, s: rows that are closer count for less. Whitening them as an Ornstein-Uhlenbeck process makes other
+/// Correlation time of errors, s: rows that are closer count for less. Whitening them as an Ornstein-Uhlenbeck process makes other
 /// recordings worse (docs/notes/2026-11-26-correction-several-recordings.md).
 const ERROR_TIME_S: f64 = 4.0;
 /// Keeps the kernels of the few rows apart, and the equations regular.
@@ -52,7 +52,7 @@ pub(super) struct Sums {
     own: Vec<Normal>,
     all: Normal,
     recordings: Vec<Range<usize>>,
-    /// Share of a row that no neighbour has told.
+    /// Share of a row's information that its neighbours do not have.
     share: f64,
 }
 
@@ -114,7 +114,7 @@ impl Sums {
         (1.0 + WHITE) * noise * noise
     }
 
-    /// Normal equations with the prior; without one recording, if so asked.
+    /// Factors the normal equations with the prior; without one recording, if given.
     fn factor(&self, noise: f64, without: Option<&Normal>) -> Option<Cholesky<f64, Dyn>> {
         let mut matrix = &self.regular * Self::white(noise) + &self.all.matrix;
         if let Some(own) = without {
@@ -194,7 +194,7 @@ impl Sums {
 }
 
 impl Normal {
-    /// Of the rows of a recording, whose offset stands at a place among so many unknowns.
+    /// Computes the sums over the rows of a recording, whose offset has a place among the unknowns.
     fn of_recording(
         (kernels, targets): (&DMatrix<f64>, &DVector<f64>),
         rows: &Range<usize>,

@@ -121,7 +121,7 @@ fn a_correction_says_what_the_textbook_says() {
     }
 }
 
-/// A process of one side of time says what the textbook says of rows that have nothing but that side.
+/// Compares a process of one side of time with the textbook's, on rows that have nothing but that side.
 #[test]
 fn one_sided_processes_see_their_side_alone() {
     const BOTH: usize = 17;
@@ -159,7 +159,7 @@ fn one_sided_processes_see_their_side_alone() {
     }
 }
 
-/// With fewer inducing rows the variance is larger, never smaller, and the mean as with all.
+/// Tests inducing rows: with fewer of them the variance is larger, never smaller, and the mean stays as with all.
 #[test]
 fn inducing_rows_cost_no_certainty_that_is_not_there() {
     let (inputs, strain, time_s) = examples(200, 1.7);
@@ -185,8 +185,8 @@ fn inducing_rows_cost_no_certainty_that_is_not_there() {
     }
 }
 
-/// Of eight inputs of rows that have nothing to do with each other the target depends on the first and the third. The third gets
-/// the shortest length scale, and rows that were not learned from are explained better than with any one length scale of all.
+/// Tests length scales: of eight inputs of independent rows the target depends on the first and the third. The third gets
+/// the shortest length scale, and held-out rows are explained better than with any one length scale of all.
 #[test]
 fn inputs_that_tell_nothing_get_long_length_scales() {
     const SETTINGS: Settings = Settings { lengths: Vec::new(), noise: 0.03, noise_time_s: 2.0 };
@@ -214,7 +214,7 @@ fn inputs_that_tell_nothing_get_long_length_scales() {
     }
 }
 
-/// What a process says of a block in closed form is what one says that was never told of it, centre and scale aside.
+/// Compares the closed form of a process without a block to a process that never had the block, centre and scale aside.
 #[test]
 fn blocks_left_out_are_predicted_from_the_others() {
     let (inputs, strain, time_s) = examples::<D>(50, 1.7);
@@ -265,8 +265,8 @@ fn surprise(error: &DVector<f64>, covariance: &DMatrix<f64>) -> f64 {
     0.5 * (error.dot(&(inverse * error)) + logs)
 }
 
-/// Costs of two settings differ as negative logarithms of densities do that are summed over blocks which a process that was never
-/// told of them predicts, each with the prior variance that makes the sum least.
+/// Costs of two settings differ by the negative logarithms of densities, summed over held-out blocks. A process that never had these
+/// blocks predicts them, each with the prior variance that minimises the sum.
 #[test]
 fn settings_are_judged_by_evidence_and_by_what_was_left_out() {
     const ROWS: usize = 23;
@@ -324,8 +324,8 @@ fn settings_are_judged_by_evidence_and_by_what_was_left_out() {
     }
 }
 
-/// In the last fifth of the rows three of eight are off: the factor that covers the worst block covers 31 of its 32 rows (the 95 % quantile
-/// by rank), the one that covers all together 153 of 160.
+/// Tests the factors: in the last fifth of the rows three of eight are off. The factor that covers the worst block covers 31 of its 32
+/// rows (the 95 % quantile by rank), the one that covers all together 153 of 160.
 #[test]
 fn a_factor_covers_the_worst_block_or_all_together() {
     let (inputs, strain, time_s) = examples::<D>(160, 0.5);
@@ -354,8 +354,8 @@ fn a_factor_covers_the_worst_block_or_all_together() {
     assert_eq!(together.into_iter().sum::<usize>(), 153, "{together:?}");
 }
 
-/// What was learned is better than the filter, on rows between those it was learned from, and what lies far from them is
-/// left as the filter says, with a wide interval.
+/// Tests learning: the correction is better than the filter on rows between the training rows; far from them the estimate stays
+/// the filter's, with a wide interval.
 #[test]
 fn learning_helps_near_and_leaves_far_alone() {
     let (inputs, strain, time_s) = examples(160, 0.5);

@@ -1,4 +1,4 @@
-//! Advice on the next recording, as motions of a rig: what moves, how fast, how long. Speeds are said as the duration of a stroke over the
+//! Advice on the next recording, as motions of a rig: what moves, how fast, how long. Speeds are given as the duration of a stroke over the
 //! whole range, so that they hold for strains and angles.
 
 use nalgebra::{Cholesky, DMatrix};
@@ -14,7 +14,7 @@ const LEAST_SURE: f64 = 0.25;
 const ONE_SPEED: f64 = 1.15;
 /// The variance of a weight may be this many times what it were if its column stood alone; the usual rule.
 const LARGEST_INFLATION: f64 = 10.0;
-/// Releases that go back less than this share of the way told nothing of the law of release.
+/// Least way back of a release, as a share of the way, that carries information on the law of release.
 const LEAST_BACK: f64 = 0.1;
 /// Fewer strokes over the whole range do not repeat, so that none can be left out.
 const FEWEST_STROKES: f64 = 6.0;
@@ -56,7 +56,7 @@ pub(crate) fn advice(
     told.into_iter().flatten().collect()
 }
 
-/// The law of release is told by releases only.
+/// Advises more releases, or stretches, if there are too few of one kind: only they determine their law.
 fn both_directions(stats: &MotionStats, stroke_s: f64) -> Option<String> {
     let [stretched, released] = stats.distances;
     let stroke = duration(stroke_s);
@@ -94,7 +94,7 @@ fn near_zero(range: RangeParams) -> Option<String> {
     })
 }
 
-/// The longest time constant, s, that is not told well, or ends on the bound that the recording's length sets.
+/// Returns the longest time constant, s, that is poorly determined, or ends on the bound that the recording's length sets.
 fn slow_relaxation(parameters: &Uncertainty, on_bound: &[OnBound]) -> Option<f64> {
     let all = parameters.names.iter().zip(&parameters.values).zip(&parameters.standard_errors);
     let open = all.filter(|((name, tau_s), error_s)| {
@@ -166,7 +166,7 @@ fn variance_inflation(jacobian: &DMatrix<f64>) -> Vec<f64> {
         .map_or(vec![f64::INFINITY; size], |factor| factor.inverse().diagonal().iter().copied().collect())
 }
 
-/// A duration as people say it: two figures of seconds, minutes or hours.
+/// Formats a duration for people: two figures of seconds, minutes or hours.
 fn duration(seconds: f64) -> String {
     match seconds {
         s if s < 100.0 => format!("{} s", number(s)),

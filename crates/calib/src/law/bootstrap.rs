@@ -10,7 +10,7 @@ use crate::order::sorted;
 use crate::samples::Samples;
 use ohmstrain_sensor::LawParams;
 
-/// Percentile intervals of a law's parameters from recordings whose blocks were drawn anew.
+/// Percentile intervals of a law's parameters from recordings whose blocks were resampled.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bootstrap {
     /// Names of the parameters.
@@ -64,7 +64,7 @@ pub fn bootstrap_law(
     Ok(Bootstrap { lower: percentile(0.025), upper: percentile(0.975), replicates: drawn.len(), names, values })
 }
 
-/// As many rows as there are, block by block.
+/// Draws as many rows as there are, block by block.
 fn draw(rows: &[usize], rng: &mut ChaCha12Rng) -> Vec<usize> {
     let mut out = Vec::with_capacity(rows.len() + rows.len() / BOOTSTRAP_BLOCKS);
     while out.len() < rows.len() {

@@ -6,7 +6,7 @@ use crate::law::structure::GaugeFamily;
 use crate::law::structure::LawStructure;
 use crate::samples::Samples;
 
-/// How well a structure of the law explains recordings, and what its parameters cost.
+/// Fit of a structure of the law to recordings, and the cost of its parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StructureScore {
     /// The structure.
@@ -15,7 +15,7 @@ pub struct StructureScore {
     pub parameters: usize,
     /// Root mean squared residual, relative to R₀.
     pub error: f64,
-    /// The same on blocks left out.
+    /// Root mean squared residual on held-out blocks, relative to R₀.
     pub cross_validated_error: f64,
     /// Akaike's criterion; smaller is better.
     pub aic: f64,
@@ -26,7 +26,7 @@ pub struct StructureScore {
 /// Most branches compared.
 const MOST_BRANCHES: usize = 3;
 
-/// Every structure with up to three branches, fitted with the least ridge and compared; structures that do not fit are
+/// Fits every structure with up to three branches, with the least ridge, and compares them; structures that cannot be fitted are
 /// left out.
 ///
 /// Residuals of such laws are correlated over seconds. The criteria count rows as if they were independent, so the rows

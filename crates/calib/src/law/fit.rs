@@ -24,7 +24,7 @@ impl Default for LawOptions {
 }
 
 impl LawOptions {
-    /// Structures that a calibration for this estimator chooses from unless somebody asks for one: one to three branches for
+    /// Returns the structures that a calibration for this estimator chooses from by default: one to three branches for
     /// those that were seen to gain from the choice, two for the others.
     #[must_use]
     pub const fn candidates(kind: EstimatorKind) -> &'static [Self] {
@@ -55,13 +55,13 @@ pub struct CrossFit {
 
 /// Branches of a law that is fitted by itself.
 const DEFAULT_BRANCHES: usize = 2;
-/// Family unless somebody asks for another. Others sometimes follow the resistance a little better; only the polynomial
+/// Default family. Others sometimes follow the resistance a little better; only the polynomial
 /// is linear in its coefficients, so that the ridge keeps it tame and the filter from taking one direction for the other.
 const DEFAULT_GAUGE: GaugeFamily = GaugeFamily::Polynomial;
 /// Time constants tried.
 const GRID: usize = 12;
 /// Ridges tried, relative to the variance of each column. The least one explains most and often makes a filter lock onto
-/// the wrong direction; which one an estimator stands is for its own score to say.
+/// the wrong direction; each estimator's own score chooses among them.
 const LAW_RIDGES: [f64; 5] = [0.1, 0.03, 0.01, 0.003, 0.001];
 /// Steps of the polish of the time constants, and the side of its first simplex in ln τ.
 const POLISH_STEPS: u64 = 40;

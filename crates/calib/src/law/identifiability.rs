@@ -34,7 +34,7 @@ const NEAR: f64 = 1e-3;
 /// Correlations reported in words are the strongest ones.
 const STRONGEST: usize = 5;
 
-/// Examines what `recordings` say about the parameters of `law`, which was fitted to them.
+/// Examines the information of `recordings` about the parameters of `law`, which was fitted to them.
 ///
 /// The ridge of the fit hides what a recording leaves open. Here the law is fitted again without it, from where it is.
 ///
@@ -68,8 +68,8 @@ fn condition_number(jacobian: &DMatrix<f64>) -> f64 {
 }
 
 impl Identifiability {
-    /// The parameters without the ridge, but for time constants that end on a bound: a recording does not tell those, and
-    /// their standard errors say how well the bound is known.
+    /// Returns the parameters without the ridge, except time constants that end on a bound: a recording does not determine those, and
+    /// their standard errors measure how well the bound is known.
     #[must_use]
     pub fn told(&self) -> Uncertainty {
         let Uncertainty { names, values, standard_errors, covariance } = &self.parameters;

@@ -6,7 +6,7 @@ use crate::law::structure::LawStructure;
 use crate::law::uncertainty::Linearised;
 use ohmstrain_sensor::LawParams;
 
-/// Keeps columns that cannot be told apart from making the equations singular, and does nothing else: a parameter with a
+/// Ridge that keeps indistinguishable columns from making the equations singular, and does nothing else: a parameter with a
 /// standard error below a thousandth of the response's spread moves by less than a thousandth of it.
 const NUMERICAL_RIDGE: f64 = 1e-8;
 /// Steps of Gauss-Newton, and the change of a nonlinear parameter below which it stops.
@@ -15,10 +15,10 @@ const TOLERANCE: f64 = 1e-6;
 /// Times a step is halved.
 const HALVINGS: usize = 12;
 
-/// The structure of `law` fitted by least squares without the ridge, time constants within their bounds.
+/// Fits the structure of `law` by least squares without the ridge, time constants within their bounds.
 ///
-/// The ridge is good for the filter and pulls parameters away from where the recording puts them; what the recording says
-/// about them, and how surely, only the fit without it shows.
+/// The ridge is good for the filter and pulls parameters away from where the recording puts them; only the fit without it shows
+/// the recording's information about them, and its certainty.
 pub(crate) fn without_ridge(law: &LawParams, regression: &LawRegression) -> Result<LawStructure, CalibrationError> {
     settle(LawStructure::of_law(law, regression.scale.span, NUMERICAL_RIDGE), regression)
 }
@@ -92,7 +92,8 @@ fn keep_within_bounds(structure: &mut LawStructure, regression: &LawRegression) 
     }
 }
 
-/// In the unit of the readings. Relative to an R₀ that is fitted as well, a fit could shrink its error by raising R₀.
+/// Returns the squared error in the unit of the readings. Relative to an R₀ that is fitted as well, a fit could shrink its error by
+/// raising R₀.
 fn squared_error(structure: &LawStructure, regression: &LawRegression) -> Option<f64> {
     let design = structure.design(regression);
     let solution = regression.solve(&design, structure.ridge, None)?;

@@ -241,10 +241,10 @@ impl RecordingRows {
     }
 }
 
-/// From the pace of the motion (or three sampling intervals) to a quarter of the longest recording.
+/// Returns the range of time constants, from the pace of the motion (or three sampling intervals) to a quarter of the longest recording.
 ///
-/// A branch faster than the motion cannot be told from the dash-pot. Fitting one all the same makes a law that explains
-/// the recording better and a filter that takes stretching for releasing.
+/// A branch faster than the motion cannot be told from the dash-pot. A law with such a branch explains the recording better,
+/// but its filter takes stretching for releasing.
 fn tau_bounds(samples: &[Samples]) -> (f64, f64) {
     let stats = MotionStats::new(samples);
     let intervals = samples

@@ -21,7 +21,7 @@ pub trait ModelFamily<const N: usize, const L: usize> {
 pub struct Parameter {
     /// Its name.
     pub name: &'static str,
-    /// Where the search starts, in the parameter's unit.
+    /// Starting value of the search, in the parameter's unit.
     pub start: f64,
     /// Smallest value allowed, positive.
     pub lower: f64,

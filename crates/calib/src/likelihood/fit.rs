@@ -13,7 +13,7 @@ pub struct Likelihood<'a, F, const N: usize, const L: usize> {
     pub family: &'a F,
     /// Their parameters, in the order in which the family takes them.
     pub parameters: &'a [Parameter],
-    /// Recordings; each starts anew.
+    /// Recordings; the filter restarts for each.
     pub recordings: &'a [ReadingSeries<'a>],
 }
 

@@ -30,13 +30,13 @@ impl ReadingSeries<'_> {
 /// Log density of readings under a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReadingsLikelihood<T> {
-    /// Every constant counted.
+    /// Log-likelihood with all constants.
     pub value: T,
     /// Readings that were not missing.
     pub readings: usize,
 }
 
-/// The log-likelihood of recordings that start anew each. Parameters are on their natural scale.
+/// Returns the log-likelihood of recordings; the filter restarts for each. Parameters are on their natural scale.
 pub(super) fn log_likelihood<T, F, const N: usize, const L: usize>(
     family: &F,
     parameters: &[T],

@@ -1,11 +1,11 @@
-//! Maximum likelihood on the readings alone, for recordings whose strain nobody measured.
+//! Maximum likelihood on the readings alone, for recordings without a measured strain.
 //!
 //! [`Likelihood`] joins a family of models ([`ModelFamily`]), parameters and recordings. It gives the log-likelihood of
 //! the Kalman filter's innovations with exact gradient and Hessian on the logarithms of the parameters (hyper-dual
 //! numbers run through the same filter), the maximum, standard errors and profile intervals. [`LikelihoodProblem`] does it for a sensor
 //! whose law is known.
 //!
-//! The likelihood trusts the model. A law that is wrong by more than its noise says makes a filter overconfident, which
+//! The likelihood trusts the model. If the law is wrong by more than its noise allows for, the filter becomes overconfident, which
 //! readings alone do not show: where a reference exists, [`calibrate`](crate::calibrate) is better.
 //!
 //! # Policy

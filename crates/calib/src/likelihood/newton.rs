@@ -11,7 +11,7 @@ pub(super) trait Objective {
     fn derivatives(&self, at: &[f64]) -> Result<Derivatives, CalibrationError>;
 }
 
-/// Where the search ended.
+/// End point of the search.
 pub(super) struct Optimum {
     pub point: Vec<f64>,
     pub derivatives: Derivatives,

@@ -14,7 +14,7 @@ use ohmstrain_sensor::LawParams;
 /// The strain is not needed. In exchange the law is trusted: its error goes into whatever noise fits it best.
 #[derive(Clone, Copy, Debug)]
 pub struct LikelihoodProblem<'a> {
-    /// Recordings; each starts anew.
+    /// Recordings; the filter restarts for each.
     pub recordings: &'a [ReadingSeries<'a>],
     /// The law; at most four branches.
     pub law: &'a LawParams,
@@ -24,7 +24,7 @@ pub struct LikelihoodProblem<'a> {
     pub free: &'a [NoiseParameter],
 }
 
-/// Makes the likelihood of the size that a problem's law has and asks it.
+/// Makes the likelihood of the size of a problem's law, and evaluates an expression on it.
 macro_rules! asked {
     ($problem:expr, $likelihood:ident => $answer:expr) => {{
         let (parameters, branches) = ($problem.parameters(), $problem.law.branches.len());

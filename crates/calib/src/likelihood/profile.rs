@@ -12,7 +12,8 @@ const MOST_STEPS: usize = 30;
 const TOLERANCE: f64 = 1e-6;
 /// Longest step, in the logarithm of a parameter.
 const LONGEST: f64 = 2.0;
-/// A change of gradient nearer than this share to what the Hessian says teaches nothing but rounding.
+/// Least cosine between the unexplained change of gradient and the step for a rank-one update of the Hessian: a smaller one
+/// is rounding.
 const TEACHES: f64 = 1e-8;
 
 /// A 95 % interval from the profile likelihood: the values for which the other parameters can make the readings likely
@@ -39,8 +40,8 @@ impl<F: ModelFamily<N, L>, const N: usize, const L: usize> Likelihood<'_, F, N, 
     }
 }
 
-/// On the way from the maximum to an end, where the likelihood has fallen to its target and the gradient of the others is
-/// zero. Logarithms.
+/// Walk from the maximum to an end of the interval, where the likelihood has fallen to its target and the gradient of the other
+/// parameters is zero. In logarithms.
 struct Walk<'a, F, const N: usize, const L: usize> {
     likelihood: &'a Likelihood<'a, F, N, L>,
     /// Parameters that move, and which of them the interval is about.
@@ -150,7 +151,7 @@ impl<'a, F: ModelFamily<N, L>, const N: usize, const L: usize> Walk<'a, F, N, L>
         }
     }
 
-    /// Computes the Hessian anew where the updates have led astray.
+    /// Computes the Hessian again where the updates have led astray.
     fn exact_hessian(&mut self) -> Option<()> {
         let here = derivatives(self.likelihood.family, &self.point, self.likelihood.recordings).ok()?;
         self.hessian = sub_matrix(&here.hessian, &self.free);

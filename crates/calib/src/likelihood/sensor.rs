@@ -12,7 +12,7 @@ pub struct NoiseStart {
 }
 
 impl NoiseStart {
-    /// Those of an estimator. The likelihood takes errors of readings for white: it starts with what they amount to at the
+    /// Takes the start from an estimator. The likelihood takes errors of readings for white: it starts with their size at the
     /// usual step of the rows.
     #[must_use]
     pub fn new(estimator: &EstimatorParams, time_s: &[f64]) -> Self {
@@ -29,14 +29,14 @@ pub struct NoiseFit {
     pub noise: NoiseParams,
     /// The motion found.
     pub motion: MotionParams,
-    /// How sure it is.
+    /// Uncertainty of the parameters.
     pub fit: LikelihoodFit,
     /// Warnings in words; empty if all went well.
     pub warnings: Vec<String>,
 }
 
-/// A logarithm known no better than this is a parameter about which the readings say next to nothing: a 95 % interval
-/// from a fiftieth to fifty times the value.
+/// Largest standard error of a logarithm before a warning: with it the readings carry next to no information on the parameter, a
+/// 95 % interval from a fiftieth to fifty times the value.
 const LEAST_SURE: f64 = 2.0;
 
 pub(super) fn found(start: &NoiseStart, free: &[NoiseParameter], fit: &LikelihoodFit) -> (NoiseParams, MotionParams) {

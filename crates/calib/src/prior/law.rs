@@ -14,7 +14,7 @@ use ohmstrain_sensor::RangeParams;
 /// The law of one more sensor of the make: a cubic gauge and branches whose time constants are the make's.
 ///
 /// Everything else is linear in it and so has a normal posterior in closed form. A sensor that relaxes faster or slower than
-/// the make is told by its gains.
+/// the make differs in its gains.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LawPrior {

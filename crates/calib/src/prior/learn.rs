@@ -21,8 +21,8 @@ const LEAST_VARIANCE: f64 = 1e-8;
 impl Prior {
     /// Learns from calibrated sensors of one make. The same sensors in the same order give the same prior.
     ///
-    /// Laws of whatever structure are expressed in the commonest number of branches with its median time constants, by what
-    /// they say of one motion. From their spread the standard errors in the sensors' parameters are taken off. Those are of
+    /// Laws of whatever structure are expressed in the commonest number of branches with its median time constants, by their
+    /// readings for one motion. The standard errors in the sensors' parameters are subtracted from their spread. Those are of
     /// the fit without its ridge, and so larger than the errors that the law itself has: a tenth of the spread is left in any
     /// case.
     ///

@@ -26,7 +26,7 @@ use ohmstrain_sensor::{EstimatorKind, Quantity, Validity};
 
 /// Version of the file that a prior is written to.
 pub const PRIOR_FORMAT: u32 = 2;
-/// Sensors that a spread can be told from.
+/// Least number of sensors from which a spread can be estimated.
 pub(crate) const FEWEST_SENSORS: usize = 3;
 
 /// The content of `prior.toml`.
@@ -37,7 +37,7 @@ pub struct Prior {
     pub format: u32,
     /// Program and version that made it.
     pub made_by: String,
-    /// How many sensors it was learned from.
+    /// Number of sensors that it was learned from.
     pub sensors: usize,
     /// The estimated quantity.
     pub quantity: Quantity,

@@ -30,7 +30,7 @@ const LEAST_SD: f64 = 0.1;
 const NO_SPEED: f64 = 1e-12;
 
 impl EstimatorPrior {
-    /// From several sensors' parameters of the estimator; `None` if there are none, or some have phases and others have not.
+    /// Learns it from several sensors' parameters of the estimator; `None` if there are none, or only some have phases.
     pub(super) fn learn(sensors: &[&EstimatorParams]) -> Option<Self> {
         let points: Vec<DVector<f64>> = sensors.iter().map(|params| point(params)).collect();
         let size = points.first()?.len();
@@ -58,7 +58,7 @@ impl EstimatorPrior {
     }
 }
 
-/// In the order in which calibration searches.
+/// Returns the parameters in the order in which calibration searches.
 fn point(params: &EstimatorParams) -> DVector<f64> {
     let MotionParams { rate_time_s, rate_sd_per_s, strain_sd, .. } = params.motion;
     let noise = params.noise;

@@ -14,9 +14,9 @@ pub(super) struct Population {
 }
 
 impl Population {
-    /// Of at least two members; `errors` is the covariance of a usual member's own errors, if it is known.
+    /// Estimates the population from at least two members; `errors` is the covariance of a usual member's own errors, if it is known.
     ///
-    /// The sample covariance is shrunken toward its diagonal, the errors are taken off it, and what the mean lacks is added:
+    /// The sample covariance is shrunk toward its diagonal, the errors are subtracted, and the uncertainty of the mean is added:
     /// the predictive distribution of one more member, `N(m, Σ + S/n)`.
     pub(super) fn new(members: &[DVector<f64>], errors: Option<&DMatrix<f64>>) -> Self {
         let n = members.len() as f64;
@@ -90,7 +90,7 @@ mod tests {
         DMatrix::from_element(1, 1, value)
     }
 
-    /// By hand: mean 3, squares 4 + 1 + 1 + 4 over three degrees of freedom.
+    /// Compares with values by hand: mean 3, squares 4 + 1 + 1 + 4 over three degrees of freedom.
     #[test]
     fn one_number_is_the_normal_normal_model() {
         let members: Vec<DVector<f64>> = [1.0, 2.0, 4.0, 5.0].iter().map(|x| DVector::from_element(1, *x)).collect();
@@ -127,7 +127,7 @@ mod tests {
         assert!((found[(0, 0)] - sd_a * sd_a).abs() < 1e-9 && (found[(1, 1)] - sd_b * sd_b).abs() < 1e-9);
     }
 
-    /// Where errors share the axes of what is seen, variance by variance.
+    /// Tests errors with the axes of the sample covariance: they are subtracted variance by variance.
     #[test]
     fn errors_are_taken_off_along_their_own_axes() {
         let turn = DMatrix::from_row_slice(2, 2, &[0.8, -0.6, 0.6, 0.8]);

@@ -9,9 +9,9 @@ use crate::product::product;
 use crate::samples::Samples;
 use ohmstrain_sensor::{LawParameter, LawParams, RangeParams, Uncertainty};
 
-/// A motion over the whole range at three speeds, with holds and smaller loops: laws that say the same of it are the same.
+/// Motion over the whole range at three speeds, with holds and smaller loops: laws with the same readings for it are the same.
 ///
-/// Laws of other structures, and with other time constants, are expressed in one structure by what they say there.
+/// Laws of other structures, and with other time constants, are expressed in one structure by their readings for it.
 pub(super) struct Probe {
     regression: LawRegression,
     columns: DMatrix<f64>,
@@ -24,7 +24,7 @@ const STATIONS: [f64; 11] = [0.0, 1.0, 1.0, 0.0, 0.0, 0.5, 1.0, 0.5, 0.5, 0.2, 0
 const SPEEDS: [f64; 3] = [1.0, 0.3, 0.1];
 /// Rows from one station to the next.
 const LEG_ROWS: usize = 60;
-/// How long a hold lasts, in movements over the whole range.
+/// Duration of a hold, in movements over the whole range.
 const HOLD: f64 = 2.0;
 /// Keeps columns that look alike from making the equations singular; relative to their variance.
 const RIDGE: f64 = 1e-6;
@@ -32,7 +32,7 @@ const RIDGE: f64 = 1e-6;
 const STEP: f64 = 1e-4;
 
 impl Probe {
-    /// For laws with these time constants; `fastest` is in 1/s.
+    /// Creates the probe for laws with these time constants; `fastest` is in 1/s.
     pub(super) fn new(range: RangeParams, fastest: f64, tau_s: &[f64]) -> Result<Self, CalibrationError> {
         let (time_s, strain) = motion(range, fastest);
         // What is read does not matter, but that it changes.
@@ -50,14 +50,14 @@ impl Probe {
         Ok(Self { regression, columns, normal })
     }
 
-    /// The weights of the common structure that say most nearly what this law says.
+    /// Returns the weights of the common structure whose readings are nearest to those of this law.
     pub(super) fn weights(&self, law: &LawParams) -> DVector<f64> {
         let structure = LawStructure::of_law(law, self.regression.scale.span, 0.0);
         let said = structure.design(&self.regression).fitted(&structure.weights(law, self.regression.scale));
         self.normal.solve(&self.columns.tr_mul(&said))
     }
 
-    /// Covariance of those weights from that of the law's parameters; parameters that are not told are taken for known.
+    /// Returns the covariance of those weights from that of the law's parameters; undetermined parameters are taken for known.
     pub(super) fn errors(&self, law: &LawParams, told: &Uncertainty) -> DMatrix<f64> {
         let mut slopes = DMatrix::zeros(self.columns.ncols(), told.names.len());
         for (j, name) in told.names.iter().enumerate() {

@@ -16,14 +16,14 @@ const LEAST_FROM_BOUND: f64 = 1e-6;
 pub struct CorrectionPrior {
     /// The filter that it corrects.
     pub corrects: EstimatorKind,
-    /// How it sees readings: the median sensor's.
+    /// Scale of the readings, the median sensor's.
     pub readings: CorrectionScale,
     /// Rows of all sensors, in order of time.
     pub rows: Vec<TrainingRow>,
 }
 
 impl CorrectionPrior {
-    /// From the corrections of several sensors, all of one filter; `None` without any.
+    /// Collects rows from the corrections of several sensors, all of one filter; `None` without any.
     pub(super) fn learn(sensors: &[&CorrectionParams]) -> Option<Self> {
         let first = sensors.first()?;
         let scales: Vec<CorrectionScale> = sensors.iter().map(|one| one.readings).collect();
@@ -58,7 +58,7 @@ fn median_scale(scales: &[CorrectionScale]) -> CorrectionScale {
     }
 }
 
-/// Where a low-pass starts, told on a scale of another centre and half range.
+/// Converts a low-pass's starting values to a scale of another centre and half range.
 fn start_on(scale: &CorrectionScale, [a, b]: [f64; 2], (centre, half_range): (f64, f64)) -> [f64; 2] {
     [(a * scale.half_range + (b - 1.0) * (centre - scale.centre)) / half_range, b]
 }
@@ -109,7 +109,7 @@ mod tests {
         }
     }
 
-    /// The same low-pass at the same reading, whatever scale it is told on.
+    /// Tests that a low-pass at one reading is the same on any scale.
     #[test]
     fn starts_are_moved_with_the_scale() {
         let (centre, half_range, start) = (0.3, 0.25, [0.3, 0.4]);

@@ -21,7 +21,7 @@ fn prior(mean: Vec<f64>, variance: f64) -> LawPrior {
     LawPrior { range: RANGE, tau_s: vec![4.0], error_density_s: 1e-4, mean, covariance }
 }
 
-/// That sensor's readings, by small Euler steps between rows 0.1 s apart.
+/// Simulates that sensor's readings, by small Euler steps between rows 0.1 s apart.
 fn recording() -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     const STEPS: u32 = 2000;
     let row = |k: u32| 0.15 - 0.15 * (0.05 * f64::from(k)).cos() * (0.013 * f64::from(k)).cos();
@@ -75,7 +75,7 @@ fn a_prior_of_no_spread_wins() {
     assert!((law.branches[0].extend_gain - 1.25 * 0.9).abs() < 1e-6);
 }
 
-/// With the right mean R₀ is the recording's, however tight the prior, from a median reading that is a third larger.
+/// Tests R₀: with the right mean it is the recording's, however tight the prior, from a median reading that is a third larger.
 #[test]
 fn the_resistance_at_rest_is_the_sensors_own() {
     for variance in [1e-12, 1e-4, 1.0] {

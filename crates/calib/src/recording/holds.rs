@@ -7,13 +7,13 @@ use crate::samples::{Samples, filled_strain};
 pub struct Hold {
     /// Its rows.
     pub rows: Range<usize>,
-    /// How long it lasts, s.
+    /// Duration, s.
     pub duration_s: f64,
     /// The mean reading of its last seconds: where the reading has settled.
     pub last_reading: f64,
 }
 
-/// Holds shorter than this, s, say nothing of where a reading settles.
+/// Shortest hold, s, that shows where a reading settles.
 pub(crate) const LEAST_HOLD_S: f64 = 20.0;
 /// Share of the strain's range within which a held strain stays, to each side of its middle.
 const STILL: f64 = 0.005;
@@ -78,7 +78,7 @@ mod tests {
     use super::holds;
     use crate::samples::Samples;
 
-    /// Up in 2 s, held for 60 s at 0.3 with a jitter of 0.4 % of the range, down, held for 30 s at 0.
+    /// Returns a strain that rises in 5 s, is held for 60 s at 0.3 with a jitter of 0.4 % of the range, falls, and is held for 30 s at 0.
     fn strain(t: f64) -> f64 {
         let jitter = 0.0012 * (if (10.0 * t) as i64 % 2 == 0 { 1.0 } else { -1.0 });
         match t {

@@ -31,7 +31,7 @@ fn step(readings: &[f64]) -> Option<f64> {
     gaps.get((QUANTILE * gaps.len() as f64) as usize).copied()
 }
 
-/// From the median of third differences: a motion of low frequency has small ones, and jumps are few.
+/// Estimates the noise from the median of third differences: a motion of low frequency has small ones, and jumps are few.
 fn noise_sd(readings: &[f64]) -> Option<f64> {
     let differences = readings.windows(4).map(|row| (row[3] - row[0] - 3.0 * (row[2] - row[1])).abs());
     let typical = median(differences.filter(|difference| difference.is_finite()))?;

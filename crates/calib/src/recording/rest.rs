@@ -7,8 +7,8 @@ const ZERO: f64 = 0.01;
 /// Measured resistance at rest as a share of the law's R₀: the median over the recordings
 /// that begin at rest, at zero strain; `None` if none does.
 ///
-/// R₀ of the law is a fitted constant, which the ridge moves: the law makes the difference good by gauge and branches where
-/// the sensor moves, but nobody can measure it.
+/// R₀ of the law is a fitted constant, which the ridge moves: where the sensor moves, the law's gauge and branches make up for the
+/// difference, but it cannot be measured.
 pub(crate) fn rest_share(recordings: &[Samples], rest_readings: &[f64], span: f64) -> Option<f64> {
     let measured = recordings.iter().zip(rest_readings);
     let shares = measured.filter_map(|(samples, rest)| Some(reading_before_moving(samples, span)? / rest));

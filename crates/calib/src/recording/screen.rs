@@ -11,9 +11,9 @@ use crate::samples::Samples;
 /// A row that calibration does not believe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Distrusted {
-    /// Which recording, from zero.
+    /// Index of the recording, from zero.
     pub recording: usize,
-    /// Which row of it, from zero.
+    /// Index of its row, from zero.
     pub row: usize,
     /// Its time, s.
     pub time_s: f64,
@@ -21,7 +21,7 @@ pub struct Distrusted {
     pub doubt: Doubt,
 }
 
-/// Why a row is not believed.
+/// Reason for not believing a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Doubt {
@@ -39,7 +39,7 @@ pub enum Doubt {
         /// The median of the rows around.
         around: f64,
     },
-    /// Reading and reference do not go together: which of them is wrong cannot be told.
+    /// Reading and reference that do not go together: it is unknown which of them is wrong.
     Law {
         /// Distance from the preliminary law in robust deviations.
         deviations: f64,
@@ -105,9 +105,9 @@ const MOST_UNEXPLAINED: f64 = 0.9;
 /// Ridges tried for that: strong ones extrapolate least.
 const SCREENING_RIDGES: [f64; 3] = [0.1, 0.01, 0.001];
 
-/// Looks for values that stand far from their neighbours, then for rows whose reading and reference do not go together,
-/// and asks whether the readings have anything to do with the reference at all. Screening what has been screened finds
-/// nothing more but what the first screening uncovered.
+/// Looks for outliers, then for rows whose reading and reference do not go together,
+/// and checks that the readings follow the reference at all. Screening the result again finds only rows that the first
+/// screening uncovered.
 ///
 /// # Errors
 /// If the recordings are too short or too plain to learn a law from, or the best law explains nothing of them.

@@ -9,7 +9,7 @@ use super::Format;
 #[derive(Debug, ClapArgs)]
 #[command(after_long_help = DETAILS)]
 pub struct BatchArgs {
-    /// What to do with each recording
+    /// Command to run on each recording
     #[arg(value_enum)]
     pub command: BatchCommand,
     /// Recordings
@@ -84,7 +84,7 @@ pub enum SummaryForm {
 }
 
 impl SummaryForm {
-    /// What file names end in.
+    /// Returns the extension of file names.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Csv => "csv",
@@ -94,7 +94,7 @@ impl SummaryForm {
     }
 }
 
-/// What the long help says after the flags.
+/// Text of the long help after the flags.
 const DETAILS: &str = "\
 Of every recording comes what COMMAND prints and writes: one that cannot be read is reported and leaves the others alone. \
 Exit code 5 says that there were such. Outputs lie in DIR as the recordings lie below the folder that all of them share.

@@ -10,7 +10,7 @@ pub struct CalibrateArgs {
     /// Recordings with a reference
     #[arg(required = true)]
     pub traces: Vec<PathBuf>,
-    /// Where to write the sensor's parameters
+    /// File to write the sensor's parameters to
     #[arg(short, long, value_name = "sensor.toml")]
     pub output: PathBuf,
     /// Use rows with time_s >= T only
@@ -29,7 +29,7 @@ pub struct CalibrateArgs {
     /// or hypotheses; ekf is calibrated in any case
     #[arg(long, default_value = "auto")]
     pub estimator: Auto<Estimator>,
-    /// What other sensors of the make have taught (`fleet fit`): a short motion is enough then
+    /// Prior learned from other sensors of the make (`fleet fit`): a short motion is enough then
     #[arg(long, value_name = "prior.toml", conflicts_with_all = ["branches", "gauge"])]
     pub prior: Option<PathBuf>,
     /// Move a reference that is early or late to where the readings say it belongs
@@ -50,7 +50,7 @@ pub struct CalibrateArgs {
     /// Report and figures, of the first recording
     #[command(flatten)]
     pub report: ReportArgs,
-    /// Whether to replace
+    /// Permission to replace files
     #[command(flatten)]
     pub replace: ReplaceArgs,
     /// Units of the recordings' columns

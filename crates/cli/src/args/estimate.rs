@@ -25,21 +25,21 @@ pub struct EstimateArgs {
     /// offset or another gain for an hour
     #[arg(long, value_name = "T:X[:SD]", allow_negative_numbers = true, value_parser = known)]
     pub known: Vec<Known>,
-    /// What the rested, unstretched sensor reads now: a number in the readings' unit, first:N for the median of the first
-    /// N readings, or calibrated for what it read in calibration. Without this flag R₀ is that too, but follows readings
-    /// that stay beyond those of the calibration; of a sensor that was calibrated on several recordings it begins at what
-    /// the first reading suggests
+    /// Reading of the rested, unstretched sensor now: a number in the readings' unit, first:N for the median of the
+    /// first N readings, or calibrated for its reading in calibration. Without this flag R₀ starts there too, but
+    /// follows readings that stay beyond those of the calibration; for a sensor that was calibrated on several
+    /// recordings it starts at the value that the first reading suggests
     #[arg(long, value_name = "OHM|first:N|calibrated", allow_negative_numbers = true)]
     pub rest_resistance: Option<RestResistance>,
     /// Turn down readings whose normalised innovation squared (column nis) is above X, two in a row at most; 10.8
     /// is one in a thousand by chance
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive)]
     pub gate: Option<f64>,
-    /// How surprising readings are taken: redescending:K, the less the farther beyond K standard deviations, huber:K,
+    /// Influence of surprising readings: redescending:K, the less the farther beyond K standard deviations, huber:K,
     /// student-t:DOF, or none, as they are [default: redescending:3]
     #[arg(long, value_name = "redescending:K|huber:K|student-t:DOF|none")]
     pub influence: Option<BoundedInfluence>,
-    /// What to do without, separated by commas, to compare; may be given several times
+    /// Parts to leave out, separated by commas, to compare; may be given several times
     #[arg(long, value_enum, value_name = "WHAT", value_delimiter = ',')]
     pub without: Vec<Without>,
     /// Units of the recording's columns
@@ -48,20 +48,21 @@ pub struct EstimateArgs {
 }
 
 impl EstimateArgs {
-    /// Whether this is to be done without.
+    /// True if this is to be left out.
     pub fn is_without(&self, what: Without) -> bool {
         self.without.contains(&what)
     }
 }
 
-/// What an estimate can do without.
+/// Part that an estimate can leave out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Without {
     /// The learned correction of the strain
     Correction,
     /// Turning down readings that are far from those of the calibration, or come again and again
     Plausibility,
-    /// Where readings jump, following what was known before any reading again (smoothers never do)
+    /// The second look after a jump of the readings, which also follows the knowledge from before any reading
+    /// (smoothers never do)
     SecondLook,
     /// Wider intervals at a start, after a fault, and outside of the calibration
     Doubts,
@@ -86,13 +87,13 @@ impl Format {
     }
 }
 
-/// How estimates are written, and where.
+/// Form and file of the estimates.
 #[derive(Debug, ClapArgs)]
 pub struct WrittenArgs {
     /// File to write instead of stdout, which is - too; a name that ends in .parquet is written as Parquet
     #[arg(short, long, value_name = "estimates.csv")]
     pub output: Option<PathBuf>,
-    /// Whether to replace
+    /// Permission to replace files
     #[command(flatten)]
     pub replace: ReplaceArgs,
     /// Form of the estimates
@@ -134,13 +135,13 @@ pub struct FilterArgs {
     /// digit, as if the stream had not ended. It may be the file that --save-state writes
     #[arg(long, value_name = "state.toml", conflicts_with = "initial_strain")]
     pub resume: Option<PathBuf>,
-    /// What to write
+    /// Output
     #[command(flatten)]
     pub written: WrittenArgs,
-    /// How to estimate
+    /// Estimation
     #[command(flatten)]
     pub estimate: EstimateArgs,
-    /// What was measured with
+    /// Setup of the measurement
     #[command(flatten)]
     pub setup: SetupArgs,
 }
@@ -150,15 +151,15 @@ pub struct FilterArgs {
 pub struct SmoothArgs {
     /// Recording, or - for stdin
     pub trace_file: PathBuf,
-    /// What to write
+    /// Output
     #[command(flatten)]
     pub written: WrittenArgs,
-    /// How to estimate
+    /// Estimation
     #[command(flatten)]
     pub estimate: EstimateArgs,
 }
 
-/// How the influence of a surprising reading is bounded.
+/// Bound on the influence of a surprising reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoundedInfluence(pub Influence<f64>);
 
@@ -195,14 +196,14 @@ fn known(text: &str) -> Result<Known, String> {
     }
 }
 
-/// Where R₀ comes from.
+/// Source of R₀.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RestResistance {
     /// Given.
     Value(f64),
     /// Median of the first readings.
     First(usize),
-    /// What it was in calibration, whatever is read.
+    /// R₀ of the calibration, whatever is read.
     Calibrated,
 }
 

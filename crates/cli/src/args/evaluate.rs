@@ -12,7 +12,7 @@ pub struct EvaluateArgs {
     /// Recordings with a reference
     #[arg(required_unless_present = "test", conflicts_with = "test")]
     pub traces: Vec<PathBuf>,
-    /// Where the calibration comes from
+    /// Source of the calibration
     #[command(flatten)]
     pub calibration: CalibrationSource,
     /// Test on this recording what was calibrated with --train; may be given several times
@@ -28,8 +28,8 @@ pub struct EvaluateArgs {
     /// Score rows with time_s >= T only; the filter still starts at the first row
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = finite, conflicts_with = "split")]
     pub from: Option<f64>,
-    /// What the rested, unstretched sensor reads: a number in the readings' unit, first:N for the median of each recording's
-    /// first N readings, or calibrated; what the estimates are compared with has its readings scaled alike. Without this flag
+    /// Reading of the rested, unstretched sensor: a number in the readings' unit, first:N for the median of each
+    /// recording's first N readings, or calibrated; the baselines have their readings scaled alike. Without this flag
     /// R₀ follows the readings, as in filter
     #[arg(long, value_name = "OHM|first:N|calibrated", allow_negative_numbers = true)]
     pub rest_resistance: Option<RestResistance>,
@@ -44,7 +44,7 @@ pub struct EvaluateArgs {
     /// Report and figures, of the first recording and the first estimator; the rows that are scored are marked
     #[command(flatten)]
     pub report: ReportArgs,
-    /// Whether to replace
+    /// Permission to replace files
     #[command(flatten)]
     pub replace: ReplaceArgs,
     /// Print JSON
@@ -55,7 +55,7 @@ pub struct EvaluateArgs {
     pub units: UnitArgs,
 }
 
-/// What a score can do without.
+/// Part that a score can leave out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum ScoredWithout {
     /// The learned correction of the strain
@@ -63,12 +63,12 @@ pub enum ScoredWithout {
 }
 
 impl EvaluateArgs {
-    /// Whether estimates have the learned correction.
+    /// True if estimates have the learned correction.
     pub fn with_correction(&self) -> bool {
         self.without != Some(ScoredWithout::Correction)
     }
 
-    /// Whether this recording is to be drawn: the first one, if anything is.
+    /// True if this recording is to be drawn: the first one, if any.
     pub fn draws(&self, name: &str) -> bool {
         let first = self.traces.first().or(self.test.first());
         let is_first = first.is_some_and(|first| first.display().to_string() == name);
@@ -76,7 +76,7 @@ impl EvaluateArgs {
     }
 }
 
-/// Where `evaluate` takes the calibration from: exactly one of these.
+/// Source of the calibration for `evaluate`: exactly one of these.
 #[derive(Debug, ClapArgs)]
 #[group(required = true, multiple = false)]
 pub struct CalibrationSource {
@@ -101,9 +101,9 @@ pub struct CalibrationSource {
 pub enum Estimators {
     /// The one that calibration chooses.
     Auto,
-    /// Every one there is; of a sensor file, every one it has parameters for.
+    /// All estimators; for a sensor file, all that it has parameters for.
     All,
-    /// This one.
+    /// A given estimator.
     One(EstimatorKind),
 }
 

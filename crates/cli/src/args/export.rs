@@ -46,7 +46,7 @@ pub struct ExportArgs {
     pub estimator: Auto<Estimator>,
     #[arg(long, value_name = "BUDGET", conflicts_with = "estimator", help = budget_help())]
     pub budget: Option<Budget>,
-    /// What names in C begin with: two sensors in one program need names of their own
+    /// Prefix of names in C: two sensors in one program need names of their own
     #[arg(long, value_name = "NAME", default_value = "ohmstrain")]
     pub prefix: Prefix,
     /// Recording with a reference: what is exported runs over it first, and its error is printed beside what was promised.

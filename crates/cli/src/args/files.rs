@@ -17,7 +17,7 @@ pub struct InspectArgs {
     /// Print JSON
     #[arg(long)]
     pub json: bool,
-    /// What is known of the files
+    /// Known properties of the files
     #[command(flatten)]
     pub known: FilesArgs,
 }
@@ -36,18 +36,18 @@ pub struct ImportArgs {
     /// anew, or a column `trial`, `run` or so has another value
     #[arg(long, requires = "output", conflicts_with = "recording")]
     pub split_recordings: bool,
-    /// Whether to replace
+    /// Permission to replace files
     #[command(flatten)]
     pub replace: ReplaceArgs,
-    /// What is known of the files
+    /// Known properties of the files
     #[command(flatten)]
     pub known: FilesArgs,
 }
 
-/// What is known of a lab's files.
+/// Known properties of a lab's files.
 #[derive(Debug, ClapArgs)]
 pub struct FilesArgs {
-    /// What a column is, by name or number: time='Time (s)', resistance=3, displacement=2:Position in the second file,
+    /// Role of a column, by name or number: time='Time (s)', resistance=3, displacement=2:Position in the second file,
     /// angle=none. Roles: time, reference-time, resistance, ratio, adc, strain, displacement, angle, temperature
     #[arg(long = "column", value_name = "ROLE=COLUMN", value_parser = column)]
     pub columns: Vec<(Role, ColumnName)>,
@@ -68,8 +68,8 @@ pub struct FilesArgs {
     /// the second file alone)
     #[arg(long = "where", value_name = "[FILE:]COLUMN=VALUE")]
     pub rows: Vec<PerFile<RowFilter>>,
-    /// Which recording of a file with several, counted from 1: where the clock begins anew, or a column `trial`, `run` or so
-    /// has another value
+    /// Recording of a file with several, counted from 1: a new one begins where the clock restarts, or a column
+    /// `trial`, `run` or so has another value
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub recording: Option<u32>,
     /// A text that stands for a missing value, besides the usual ones (OVLD, NaN, N/A, …)
@@ -81,7 +81,7 @@ pub struct FilesArgs {
     /// A role in which a lone 0 between larger values is a missing one
     #[arg(long, value_name = "ROLE")]
     pub drop_zeros: Vec<Role>,
-    /// What a reference reads at rest, in the unit of its column: displacement=0.52
+    /// Value of a reference at rest, in the unit of its column: displacement=0.52
     #[arg(long, value_name = "ROLE=VALUE", value_parser = zero)]
     pub zero: Vec<(Role, f64)>,
     /// The current's polarity flips with every reading: take means of neighbours
@@ -94,7 +94,7 @@ pub struct FilesArgs {
     /// Rows per second, where no column is a time
     #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = positive)]
     pub rate_hz: Option<f64>,
-    /// What was measured with
+    /// Setup of the measurement
     #[command(flatten)]
     pub setup: SetupArgs,
     /// A known layout: electromech-stretcher (no header; Ro, Ri, tR, P, tP, F, tF)
@@ -103,7 +103,7 @@ pub struct FilesArgs {
 }
 
 impl FilesArgs {
-    /// As the library has it.
+    /// Converts the flags to the library's recipe.
     pub fn recipe(&self) -> Recipe {
         Recipe {
             preset: self.preset,

@@ -37,13 +37,13 @@ pub struct FitLawArgs {
     /// Print JSON
     #[arg(long)]
     pub json: bool,
-    /// How tables are printed; CSV has all digits, and a column of standard errors for each parameter
+    /// Form of tables; CSV has all digits, and a column of standard errors for each parameter
     #[arg(long, value_enum, default_value_t = TableFormat::Text, conflicts_with = "json")]
     pub format: TableFormat,
     /// Also write a plot of each fit as SVG, with what is drawn as CSV, to this folder
     #[arg(long, value_name = "DIR")]
     pub figures: Option<PathBuf>,
-    /// Whether to replace
+    /// Permission to replace files
     #[command(flatten)]
     pub replace: ReplaceArgs,
     /// Print one row per material, speed and phase over all recordings
@@ -65,7 +65,7 @@ pub enum TableFormat {
     Latex,
 }
 
-/// What the long help says after the flags.
+/// Text of the long help after the flags.
 const LAWS: &str = "\
 Laws, t the time since the segment began:
   of a hold
@@ -92,12 +92,12 @@ With two or more, ± is the standard error from their scatter. A movement withou
 is fitted by eq8 alone. R^2 is that of the phase, the smallest of the row's segments. `rest` is a \
 hold after a release.";
 
-/// Which segments to fit.
+/// Choice of segments to fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SegmentChoice {
     /// The recording without a cut.
     Whole,
-    /// Those of a phase, or the one with a number, from 1.
+    /// Segments of a phase, or the one with a number, from 1.
     Phase(Phase, Option<usize>),
 }
 

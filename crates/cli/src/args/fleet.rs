@@ -7,12 +7,12 @@ use super::ReplaceArgs;
 /// Flags of `fleet`.
 #[derive(Debug, ClapArgs)]
 pub struct FleetArgs {
-    /// What to do with the sensors.
+    /// Command for the sensors.
     #[command(subcommand)]
     pub command: FleetCommand,
 }
 
-/// What can be done with sensors of one make.
+/// Commands for sensors of one make.
 #[derive(Debug, Subcommand)]
 pub enum FleetCommand {
     /// Learn what calibrated sensors of one make have in common, for `calibrate --prior`
@@ -26,10 +26,10 @@ pub struct FleetFitArgs {
     /// Calibrated sensors of one make, at least three
     #[arg(required = true, value_name = "sensor.toml")]
     pub sensors: Vec<PathBuf>,
-    /// Where to write what they have in common
+    /// File to write the prior to
     #[arg(short, long, value_name = "prior.toml")]
     pub output: PathBuf,
-    /// Whether to replace
+    /// Permission to replace files
     #[command(flatten)]
     pub replace: ReplaceArgs,
 }

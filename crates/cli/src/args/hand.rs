@@ -20,12 +20,12 @@ pub struct HandArgs {
     /// File to write instead of stdout
     #[arg(short, long, value_name = "angles.csv")]
     pub output: Option<PathBuf>,
-    /// Whether to replace
+    /// Permission to replace files
     #[command(flatten)]
     pub replace: ReplaceArgs,
 }
 
-/// What the long help says after the flags.
+/// Text of the long help after the flags.
 const FORMAT: &str = "\
 hand.toml:
   format = 1

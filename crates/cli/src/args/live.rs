@@ -33,15 +33,15 @@ pub struct LiveArgs {
     /// The key r records to PREFIX-1.csv, PREFIX-2.csv and so on; no file is replaced
     #[arg(long, value_name = "PREFIX", default_value = "live")]
     pub record: PathBuf,
-    /// How to estimate
+    /// Estimation
     #[command(flatten)]
     pub estimate: EstimateArgs,
-    /// What was measured with
+    /// Setup of the measurement
     #[command(flatten)]
     pub setup: SetupArgs,
 }
 
-/// What the long help says after the flags.
+/// Text of the long help after the flags.
 const KEYS: &str = "\
 Keys: z  the sensor is at rest, unstretched: what it reads now is R0, and the strain starts again at zero
       r  record the readings, or stop
@@ -52,7 +52,7 @@ Lines that are none of a trace are counted and passed over. A port that goes awa
 again, after a reset of the device, starts the filter again.";
 
 impl LiveArgs {
-    /// What messages call the source.
+    /// Returns the name of the source in messages.
     pub fn source(&self) -> String {
         match (&self.port, &self.udp, &self.tcp) {
             (Some(port), ..) => port.display().to_string(),

@@ -15,10 +15,10 @@ pub struct RefineArgs {
     /// The sensor's parameters: its law stays, its noise and motion are where the search starts
     #[arg(long, value_name = "sensor.toml")]
     pub sensor: PathBuf,
-    /// Where to write the refined parameters
+    /// File to write the refined parameters to
     #[arg(short, long, value_name = "refined.toml")]
     pub output: PathBuf,
-    /// Whether to replace
+    /// Permission to replace files
     #[command(flatten)]
     pub replace: ReplaceArgs,
     /// Use rows with time_s >= T only
@@ -57,7 +57,7 @@ impl FromStr for Moved {
     }
 }
 
-/// What the long help says after the flags.
+/// Text of the long help after the flags.
 const TRUST: &str = "\
 Finds the noise and motion of the extended Kalman filter that make the readings most likely, where no strain was recorded. \
 The likelihood sees how well each reading is predicted from those before it, and trusts the law for the rest. A law that \

@@ -32,7 +32,7 @@ pub struct SerialCheckArgs {
     pub steps: Option<usize>,
 }
 
-/// What the long help says after the flags.
+/// Text of the long help after the flags.
 const SKETCH: &str = "\
 The exported sketch prints what is compared where OHMSTRAIN_CHECK is 1: set it in the sketch, or as a build flag. Lines of \
 anything else are passed over. A board that starts again is compared from there; reset it if it has been running.";

@@ -18,7 +18,7 @@ pub struct ManArgs {
     /// Folder to write one page per command to; pages there of the same names are replaced
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
-    /// Whether to replace
+    /// Permission to replace files
     #[command(flatten)]
     pub replace: ReplaceArgs,
 }
@@ -29,7 +29,7 @@ mod tests {
 
     use crate::args::{Args, example};
 
-    /// What help shows is what the program takes.
+    /// Tests that the program accepts the examples that help shows.
     #[test]
     fn examples_are_commands() {
         for command in Args::command().get_subcommands() {

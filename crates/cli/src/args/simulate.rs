@@ -18,7 +18,7 @@ pub struct DemoArgs {
     /// Seed of the simulated bench
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Whether to replace
+    /// Permission to replace files
     #[command(flatten)]
     pub replace: ReplaceArgs,
 }
@@ -38,7 +38,7 @@ pub struct SimulateArgs {
     /// Illustrative material: ecoflex-00-30, ecoflex-00-50, vytaflex-10 or representative
     #[arg(long, default_value = "ecoflex-00-30")]
     pub material: Material,
-    /// What the bench does: extend-retract, extend-hold, load-steps, long-holds or mixed
+    /// Movements of the bench: extend-retract, extend-hold, load-steps, long-holds or mixed
     #[arg(long, default_value = "extend-hold")]
     pub protocol: Protocol,
     /// Largest elongation of the 30 mm sensor, mm
@@ -65,7 +65,7 @@ pub struct SimulateArgs {
     /// File to write instead of stdout
     #[arg(short, long)]
     pub output: Option<PathBuf>,
-    /// Whether to replace
+    /// Permission to replace files
     #[command(flatten)]
     pub replace: ReplaceArgs,
 }

@@ -4,14 +4,14 @@ use std::str::FromStr;
 
 use super::finite;
 
-/// Which rows of a recording calibrate, and which are scored: a share of the first rows, or, reversed, of the last ones.
+/// Split of a recording's rows into those that calibrate and those that are scored: a share of the first rows, or, reversed, of the last ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Split {
     share: f64,
     reversed: bool,
 }
 
-/// What `reversed` alone stands for.
+/// Share that `reversed` alone stands for.
 const HALF: f64 = 0.5;
 
 impl Split {

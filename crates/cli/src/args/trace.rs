@@ -5,7 +5,7 @@ use ohmstrain_bench_data::{FrontEndSpec, JointSpec, Metadata, ResistanceUnit, St
 
 use super::positive;
 
-/// What was measured with: flags of commands to which files of a lab come, or streams.
+/// Setup of a measurement: flags of commands that read files of a lab, or streams.
 #[derive(Clone, Debug, Default, ClapArgs)]
 pub struct SetupArgs {
     /// Length of the unstretched sensor, mm: turns a displacement into strain
@@ -22,7 +22,7 @@ pub struct SetupArgs {
 }
 
 impl SetupArgs {
-    /// As metadata that overrides the stream's, with the units of its columns.
+    /// Returns them as metadata that overrides the stream's, with the units of its columns.
     pub fn metadata(&self, units: &UnitArgs) -> Metadata {
         Metadata {
             gauge_length_mm: self.gauge_length_mm,
@@ -33,7 +33,7 @@ impl SetupArgs {
     }
 }
 
-/// What is replaced.
+/// Permission to replace files.
 #[derive(Clone, Copy, Debug, Default, ClapArgs)]
 pub struct ReplaceArgs {
     /// Replace files that this program did not write, too
@@ -41,7 +41,7 @@ pub struct ReplaceArgs {
     pub force: bool,
 }
 
-/// Units that a trace's metadata lines leave unsaid, or say wrongly.
+/// Units that a trace's metadata lines omit, or state wrongly.
 #[derive(Clone, Debug, Default, ClapArgs)]
 pub struct UnitArgs {
     /// Unit of a column: strain=percent or strain=fraction, resistance=kohm or resistance=ohm; repeatable, the last one of a
@@ -51,7 +51,7 @@ pub struct UnitArgs {
 }
 
 impl UnitArgs {
-    /// As metadata that overrides the file's.
+    /// Returns them as metadata that overrides the file's.
     pub fn metadata(&self) -> Metadata {
         let mut metadata = Metadata::default();
         for unit in &self.units {
@@ -67,9 +67,9 @@ impl UnitArgs {
 /// The unit of a trace's column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ColumnUnit {
-    /// Of `strain`.
+    /// Unit of `strain`.
     Strain(StrainUnit),
-    /// Of `resistance_ohm`.
+    /// Unit of `resistance_ohm`.
     Resistance(ResistanceUnit),
 }
 

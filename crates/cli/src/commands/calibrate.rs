@@ -24,7 +24,7 @@ use crate::progress::Progress;
 use crate::sensor_file;
 use ohmstrain_report::Sample;
 
-/// Calibrates a sensor on recordings, writes its parameters, and says what it came to.
+/// Calibrates a sensor on recordings, writes its parameters, and prints a summary.
 pub fn run(args: &CalibrateArgs, messages: &Messages) -> Result<(), CliError> {
     let outcome = calibrate(args, messages)?;
     let file = args.output.display().to_string();
@@ -41,14 +41,14 @@ pub fn run(args: &CalibrateArgs, messages: &Messages) -> Result<(), CliError> {
     })
 }
 
-/// What comes of a calibration, beside the sensor's file.
+/// Result of a calibration, beside the sensor's file.
 pub struct Outcome {
     sensor: Sensor,
-    /// On parts that were left out.
+    /// Findings on held-out parts.
     pub findings: Option<Findings>,
     tested: Option<Tested>,
     calibration_s: f64,
-    /// What `--explain` and `--bootstrap` print.
+    /// Text that `--explain` and `--bootstrap` print.
     explained: String,
 }
 
@@ -133,7 +133,7 @@ pub fn calibrate(args: &CalibrateArgs, messages: &Messages) -> Result<Outcome, C
     Ok(outcome)
 }
 
-/// What the flags leave to choose from.
+/// Returns the calibration with the choices that the flags have made.
 fn calibration(args: &CalibrateArgs) -> Calibration<'static> {
     let mut calibration = Calibration::new();
     if let Some(estimator) = args.estimator.chosen() {
@@ -192,7 +192,7 @@ fn known_recordings<'a>(
     recordings.iter().zip(samples).map(known).collect()
 }
 
-/// Paths are the machine's own business; the name says which recording it was.
+/// Returns the name of a file without its path, which is the machine's own business.
 fn file_name(path: &str) -> &str {
     Path::new(path).file_name().and_then(|name| name.to_str()).unwrap_or(path)
 }

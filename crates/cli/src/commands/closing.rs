@@ -1,4 +1,4 @@
-//! What `calibrate --json` prints.
+//! Output of `calibrate --json`.
 
 use std::io::Write;
 
@@ -11,7 +11,7 @@ use crate::output;
 
 /// Version of what `--json` prints.
 const SCHEMA: u32 = 1;
-/// What `--json` prints.
+/// Content of the output of `--json`.
 #[derive(Serialize)]
 struct Json<'a> {
     sensor: &'a str,
@@ -24,7 +24,7 @@ struct Json<'a> {
     /// Scores of the rows that `--from` and `--until` kept from it.
     tested: Option<&'a Tested>,
     limited_by: Option<Limit>,
-    /// Of the squared error, 0 to 1.
+    /// Shares of the squared error, 0 to 1.
     error_shares: Option<ErrorShares>,
     verdict: Option<String>,
 }

@@ -13,7 +13,7 @@ use crate::plausible;
 const NOT_TOLD: &str =
     "parameters without the ridge: not told; without it the equations of the law are singular on these recordings\n";
 
-/// What `calibrate --explain` and `--bootstrap` print.
+/// Returns the text that `calibrate --explain` and `--bootstrap` print.
 pub fn text(args: &CalibrateArgs, recordings: &[TraceFile], law: &LawParams) -> Result<String, CliError> {
     let mut text = String::new();
     let samples: Vec<Samples> = recordings.iter().map(TraceFile::samples).collect::<Result<_, _>>()?;

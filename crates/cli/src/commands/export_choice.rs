@@ -1,4 +1,4 @@
-//! Which of the filters that a chip has room for is exported.
+//! Choice of the filter to export among those that a chip has room for.
 
 use ohmstrain_sensor::SensorParams;
 
@@ -8,14 +8,14 @@ use crate::error::CliError;
 use crate::output;
 use ohmstrain_export::{self as export, Budget, Candidate, Plan};
 
-/// What is exported, and what else there was.
+/// Filter that is exported, and the candidates.
 pub struct Choice {
     pub plan: Plan,
     /// A table of all candidates, and why the next better one does not fit; none without a budget.
     pub lines: Vec<String>,
 }
 
-/// Usual time between two readings, s: what is asked for, else that of the calibration's recordings.
+/// Returns the usual time between two readings, s: the requested one, else that of the calibration's recordings.
 pub fn usual_step_s(asked: Option<f64>, params: &SensorParams) -> Result<f64, CliError> {
     asked.or_else(|| export::usual_step_s(params)).ok_or_else(|| {
         CliError::Arguments(

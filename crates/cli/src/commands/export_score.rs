@@ -1,4 +1,4 @@
-//! What an exported filter is worth on a recording, beside what was promised and what this computer makes of it.
+//! Scores of an exported filter on a recording, beside the promised ones and those of the filter on this computer.
 
 use ohmstrain::Sensor;
 use ohmstrain_calib::{Baseline, ScoredRow};
@@ -47,7 +47,7 @@ impl OnRecording {
         Ok(Self { name: recording.name.clone(), from_s: args.from, dt_s, rows, program, static_cubic })
     }
 
-    /// Of the rows that are asked for.
+    /// Returns the scores of the requested rows.
     fn scores(&self, rows: &[ScoredRow]) -> Result<Scores, CliError> {
         let counted = |row: &&ScoredRow| row.truth.is_finite() && self.from_s.is_none_or(|from_s| row.time_s >= from_s);
         ohmstrain_calib::score(&rows.iter().filter(counted).copied().collect::<Vec<_>>()).ok_or_else(|| {
@@ -55,7 +55,7 @@ impl OnRecording {
         })
     }
 
-    /// What the exported code makes of it.
+    /// Returns the scores of the exported code.
     fn exported(&self, params: &SensorParams, plan: &Plan, args: &ExportArgs) -> Result<Scores, CliError> {
         let replayed = export::replay(params, plan, self.dt_s, &self.rows)
             .map_err(|error| CliError::export(&error, &args.sensor.display().to_string()))?;
@@ -73,7 +73,7 @@ impl OnRecording {
     }
 }
 
-/// What is exported, what it is worth and what it costs.
+/// Promise of an exported filter: its errors and its costs.
 pub struct Promise {
     /// A table of errors and costs, for the header of the exported code, too.
     pub lines: Vec<String>,
@@ -83,7 +83,7 @@ pub struct Promise {
 }
 
 impl Promise {
-    /// Of a plan; scored if there is a recording.
+    /// Creates the promise of a plan; it has scores if there is a recording.
     pub fn new(
         args: &ExportArgs,
         dt_s: f64,

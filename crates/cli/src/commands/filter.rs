@@ -96,7 +96,7 @@ impl FilterRun {
         }
     }
 
-    /// For a device that has started again.
+    /// Starts again for a device that has restarted.
     fn anew(sensor: &Sensor, args: &FilterArgs) -> Result<Self, Error> {
         Self::built(builder_anew(sensor, &args.estimate), args)
     }
@@ -138,7 +138,7 @@ struct Stream<'a, W: io::Write + Send> {
     args: &'a FilterArgs,
     filter: FilterRun,
     sink: Sink<'a, W>,
-    /// What it goes on from.
+    /// State to resume from.
     stored: Option<Stored>,
     /// First and last time, s, up to now or until the clock started again.
     times: Option<(f64, f64)>,
@@ -187,7 +187,7 @@ impl<'a, W: io::Write + Send> Stream<'a, W> {
         streamed.and(finished).map(|()| (written, state))
     }
 
-    /// All that goes on with the next row.
+    /// Returns the state from which the next row can go on.
     fn state(&self, rows: &Rows) -> Result<String, CliError> {
         let mut stored = self.filter.store()?;
         stored.rest_resistance = self.sink.rest;
@@ -197,7 +197,7 @@ impl<'a, W: io::Write + Send> Stream<'a, W> {
         Ok(stored.to_toml()?)
     }
 
-    /// Takes what has come; `rows` says what it is of.
+    /// Takes a row or an error; `rows` is its source.
     fn take(&mut self, row: Result<DeviceRow, TraceError>, rows: &Rows) -> Result<(), CliError> {
         let DeviceRow { row, restarted } = match row {
             Err(TraceError::Content(fault)) if self.args.skip_bad => {
@@ -232,7 +232,7 @@ impl<'a, W: io::Write + Send> Stream<'a, W> {
         self.begin(&[])
     }
 
-    /// Tells the filter what the rested sensor reads, and whoever watches it.
+    /// Passes the reading of the rested sensor to the filter, and to the watches.
     fn begin(&mut self, known: &'a [Known]) -> Result<(), CliError> {
         let sink = &mut self.sink;
         sink.rest.map_or(Ok(()), |measured| self.filter.rest_resistance(measured))?;
@@ -257,23 +257,23 @@ impl<'a, W: io::Write + Send> Stream<'a, W> {
     }
 }
 
-/// What helps where a clock has started again.
+/// Advice for a clock that has restarted.
 const SKIPS: &str = "--skip-bad goes on with another filter";
 
-/// Where estimates go.
+/// Destination of the estimates.
 struct Sink<'a, W: io::Write + Send> {
     messages: &'a Messages,
     writer: EstimateWriter<W>,
-    /// Says when the calibration does not reach.
+    /// Watch for use outside the calibrated range.
     watch: ValidityWatch,
     quiet: QuietWatch,
     sensor: Sensor,
-    /// What the rested sensor reads, if not what it read in calibration.
+    /// Reading of the rested sensor, if it differs from that in calibration.
     rest: Option<f64>,
     file: String,
-    /// What messages call the recording's header.
+    /// Name of the recording's header in messages.
     header: String,
-    /// Not a file but standard input or a pipe: somebody waits for each row.
+    /// True for standard input or a pipe, where a reader waits for each row.
     live: bool,
     /// The first known readings of a live stream.
     early: Vec<f64>,
@@ -298,7 +298,7 @@ impl<W: io::Write + Send> Sink<'_, W> {
         if self.live { self.writer.flush() } else { Ok(()) }
     }
 
-    /// Asks about the unit of a live stream's readings, once there are enough.
+    /// Checks the unit of a live stream's readings, once there are enough.
     fn doubt_early(&self) {
         if self.early.len() == FIRST_LIVE_READINGS
             && let Err(doubt) = self.sensor.check_unit(self.early.iter().copied(), self.rest)

@@ -31,7 +31,7 @@ fn fit(args: &FleetFitArgs, messages: &Messages) -> Result<(), CliError> {
     Ok(())
 }
 
-/// What was learned, in a few words.
+/// Summarises the prior in a few words.
 fn told(prior: &Prior, output: &Path) -> String {
     let params = prior.params();
     let branches = params.law.tau_s.iter().map(|tau_s| format!("{tau_s:.1}")).collect::<Vec<_>>().join(", ");

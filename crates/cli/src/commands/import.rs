@@ -27,7 +27,7 @@ pub fn run(args: &ImportArgs, messages: &Messages) -> Result<(), CliError> {
     outputs.publish_or_print(output, bytes)
 }
 
-/// Writes each recording to a file of its own, all of them or none, and says which.
+/// Writes each recording to a file of its own, all of them or none, and prints their names.
 fn split(
     mut outputs: Outputs,
     path: &Path,
@@ -71,7 +71,7 @@ fn trace(plan: &Plan, tables: &[Table], messages: &Messages) -> Result<Vec<u8>, 
     Ok(bytes)
 }
 
-/// What is what, on one line.
+/// Lists the columns and their roles, on one line.
 fn columns(plan: &Plan, tables: &[Table]) -> String {
     let of = |table: usize| if tables.len() > 1 { format!("{}: ", tables[table].file) } else { String::new() };
     let columns = plan.columns(tables).into_iter();

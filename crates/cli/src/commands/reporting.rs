@@ -13,20 +13,20 @@ use crate::run::estimate;
 use ohmstrain::MADE_BY;
 use ohmstrain_report::{FigureFiles, Report, ReportInput, Sample, ScoreRow, Scored};
 
-/// What a report is about.
+/// Subject of a report.
 pub struct Reporting<'a> {
     pub recording: &'a TraceFile,
     pub sensor: &'a Sensor,
     /// Estimator; the sensor's own choice if there is none.
     pub kind: Option<EstimatorKind>,
-    /// What the rested sensor reads, if not what it read in calibration.
+    /// Reading of the rested sensor, if it differs from that in calibration.
     pub rest_resistance: Option<f64>,
     /// The rows that are scored, and whether they were calibrated on.
     pub part: Part,
     pub sample: Sample,
-    /// What it is worth on rows that were kept from the calibration, if that is known.
+    /// Scores on rows that were kept from the calibration, if known.
     pub tested: Option<&'a Tested>,
-    /// What else there is to say: heading and text.
+    /// Further facts: heading and text.
     pub facts: &'a [(&'static str, String)],
 }
 
@@ -36,7 +36,7 @@ pub struct Drawn {
     figures: Vec<FigureFiles>,
 }
 
-/// Where they go.
+/// Destination of report and figures.
 pub struct Wanted<'a> {
     report: Option<Claim>,
     figures: Option<&'a Path>,
@@ -119,7 +119,7 @@ impl Reporting<'_> {
     }
 }
 
-/// Whether the rows of `part` were calibrated on, by the times that a sensor file has of each recording.
+/// Tells if the rows of `part` were calibrated on, by the times that a sensor file has of each recording.
 pub fn sample(recording: &TraceFile, params: &SensorParams, part: Part) -> Sample {
     let of_it = params.recordings.iter().filter(|info| info.sha256 == recording.sha256);
     let scored = |time_s: &&f64| {

@@ -3,7 +3,7 @@ use ohmstrain_sensor::Scores;
 
 use crate::output::table;
 
-/// What the columns mean, for under the tables; no line is wider than a terminal.
+/// Meaning of the columns, for below the tables; no line is wider than a terminal.
 pub const KEY: &str = "\
 RMSE, MAE and bias (mean error) are in the unit of the reference; %FS is the RMSE in percent of the
 reference's range in the rows scored. 50/90/95 %: percent of the rows in which the interval of that

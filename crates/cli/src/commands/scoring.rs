@@ -19,7 +19,7 @@ impl Part {
         Self { from_s, until_s: None }
     }
 
-    /// Whether a row at this time is one of them.
+    /// True if a row at this time is one of them.
     pub fn holds(self, time_s: f64) -> bool {
         self.from_s.is_none_or(|from_s| time_s >= from_s) && self.until_s.is_none_or(|until_s| time_s < until_s)
     }

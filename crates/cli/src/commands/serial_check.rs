@@ -1,4 +1,4 @@
-//! Whether a board computes what this computer does.
+//! Comparison of a board's results with those of this computer.
 
 use std::path::Path;
 
@@ -53,14 +53,14 @@ pub fn run(args: &SerialCheckArgs) -> Result<(), CliError> {
     })
 }
 
-/// What the sketch prints.
+/// Line that the sketch prints.
 const LINE: &str = "step:0,us:50000,ohm:1600.0000,strain:0.10000,lo:0.08000,hi:0.12000,flags:0";
 
 /// A step as the board printed it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Step {
     number: u64,
-    /// Since the step before, µs.
+    /// Time since the step before, µs.
     since_us: u32,
     ohm: f64,
     strain: f64,
@@ -69,7 +69,7 @@ struct Step {
 }
 
 impl Step {
-    /// Of a line like [`LINE`]; `None` of any other.
+    /// Parses a line like [`LINE`]; `None` for any other.
     fn of(line: &[u8]) -> Option<Self> {
         let line = std::str::from_utf8(line).ok()?.trim();
         let parts: Vec<(&str, &str)> = line.split(',').map(|part| part.split_once(':')).collect::<Option<_>>()?;
@@ -87,14 +87,14 @@ impl Step {
     }
 }
 
-/// What came from a board.
+/// Lines that came from a board.
 struct Heard {
     steps: Vec<Step>,
     /// Lines that are no steps.
     others: usize,
 }
 
-/// Listens until there are steps enough, from a board's first one on.
+/// Reads until there are steps enough, from a board's first one on.
 fn listen(args: &SerialCheckArgs) -> Result<Heard, CliError> {
     let name = args.port.display().to_string();
     let ends = is_stdin(&args.port) || args.port.is_file();

@@ -24,7 +24,7 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
     outputs.publish_or_print(output, bytes)
 }
 
-/// A simulated recording as it is written: it says that it is one, so that it may be replaced by another.
+/// Returns a simulated recording as it is written: marked as one, so that it may be replaced by another.
 pub fn bytes(settings: &SimulationSettings) -> Result<Vec<u8>, String> {
     let mut trace: Trace = simulate(settings).map_err(|error| error.to_string())?;
     trace.metadata.other.push(("made_by".into(), format!("{MADE_BY} {SIMULATE}")));

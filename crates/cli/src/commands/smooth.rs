@@ -68,7 +68,7 @@ fn smooth_into(packed: Packed, builder: FilterBuilder, readings: &StoredReadings
 struct Segments {
     packed: Packed,
     written: SpooledTempFile,
-    /// Where each segment ends.
+    /// End of each segment.
     ends: Vec<u64>,
     /// The segment at hand.
     bytes: Vec<u8>,

@@ -1,4 +1,4 @@
-//! What a calibration is worth on the rows that `--from` and `--until` kept from it.
+//! Scores of a calibration on the rows that `--from` and `--until` kept from it.
 
 use std::ops::Range;
 
@@ -7,7 +7,7 @@ use ohmstrain_calib::{Baseline, ScoredRow};
 
 use crate::input::TraceFile;
 
-/// Fewer rows than this say nothing.
+/// Least number of rows for a score.
 const FEWEST_ROWS: usize = 10;
 
 /// A recording of which only some rows were calibrated on.

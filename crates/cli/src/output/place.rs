@@ -19,7 +19,7 @@ pub enum Identity {
 }
 
 impl Identity {
-    /// Of a file that is there.
+    /// Returns the identity of a file that exists.
     #[cfg(unix)]
     pub fn of(path: &Path) -> Option<Self> {
         use std::os::unix::fs::MetadataExt;
@@ -27,23 +27,23 @@ impl Identity {
         Some(Self::Number(found.dev(), found.ino()))
     }
 
-    /// Of a file that is there.
+    /// Returns the identity of a file that exists.
     #[cfg(not(unix))]
     pub fn of(path: &Path) -> Option<Self> {
         Some(Self::Name(fs::canonicalize(path).ok()?))
     }
 }
 
-/// Where an output goes.
+/// Destination of an output.
 pub enum Place {
     /// Into what stands there and takes bytes: a device, a pipe, an open file of this process.
     Through(File),
-    /// To a file, whole: into a temporary neighbour that then takes its place.
+    /// A file, whole: written to a temporary neighbour that then takes its place.
     Whole {
-        /// Without symbolic links: they stay, what they point to is written.
+        /// Path without symbolic links: they stay, their target is written.
         path: PathBuf,
         identity: Identity,
-        /// Of the file that is there.
+        /// Permissions of the file that exists.
         permissions: Option<Permissions>,
     },
 }
@@ -55,7 +55,7 @@ const MOST_LINKS: usize = 40;
 const HEAD: u64 = 4096;
 
 impl Place {
-    /// Looks whether `path` can be written, and leaves it as it is.
+    /// Checks that `path` can be written, and leaves it as it is.
     pub fn of(path: &Path) -> io::Result<Self> {
         let found = fs::metadata(path).ok();
         if let Some(found) = found.as_ref().filter(|found| !found.is_file() || is_descriptor(path)) {
@@ -82,7 +82,7 @@ impl Place {
         Ok(Self::Whole { path, identity, permissions })
     }
 
-    /// Which file would be replaced; none is where bytes go through.
+    /// Returns the file that would be replaced; `None` where bytes go through.
     pub const fn identity(&self) -> Option<&Identity> {
         match self {
             Self::Through(_) => None,
@@ -90,7 +90,7 @@ impl Place {
         }
     }
 
-    /// Whether there is a file with content that is not a `kind` of this program; `own` are the columns of the table that is to
+    /// True if there is a file with content that is not a `kind` of this program; `own` are the columns of the table that is to
     /// take its place.
     pub fn holds_other_than(&self, kind: Kind, own: &[String]) -> io::Result<bool> {
         let Self::Whole { path, .. } = self else { return Ok(false) };
@@ -110,7 +110,7 @@ impl Place {
         Ok(!head.is_empty() && !kind.wrote(&String::from_utf8_lossy(&head), own))
     }
 
-    /// Writes content, and says what then puts it in its place; nothing where bytes go through.
+    /// Writes content, and returns the unfinished file that then takes its place; `None` where bytes go through.
     pub fn fill(&self, content: &[u8]) -> io::Result<Option<Unfinished>> {
         let (mut file, unfinished) = self.begin()?;
         file.write_all(content)?;
@@ -155,7 +155,7 @@ impl Place {
     }
 }
 
-/// Whether this is JSON of this program: objects that have all these fields, and say so.
+/// True if this is JSON of this program: objects that have all these fields, and name the program.
 fn is_rows_of_ours(json: impl Read, own: &[String]) -> bool {
     let rows: Option<Vec<serde_json::Map<String, Value>>> = serde_json::from_reader(json).ok();
     let is_ours = |row: &serde_json::Map<String, Value>| {
@@ -165,13 +165,13 @@ fn is_rows_of_ours(json: impl Read, own: &[String]) -> bool {
     rows.is_some_and(|rows| rows.iter().all(is_ours))
 }
 
-/// Whether a path names an open file of this process: a new file in its place would not reach whoever opened it.
+/// True if a path names an open file of this process: a new file in its place would not reach the process that opened it.
 fn is_descriptor(path: &Path) -> bool {
     ["/dev/stdout", "/dev/stderr"].iter().any(|name| path == Path::new(name))
         || ["/dev/fd", "/proc/self/fd"].iter().any(|folder| path.starts_with(folder))
 }
 
-/// What a chain of symbolic links points to, be it there or not.
+/// Returns the target of a chain of symbolic links, whether it exists or not.
 fn without_links(path: &Path) -> io::Result<PathBuf> {
     let mut path = path.to_path_buf();
     for _ in 0..MOST_LINKS {

@@ -1,4 +1,4 @@
-//! Where a table of rows goes while it is made: to stdout, or to a file.
+//! Destination of a table of rows while it is made: stdout, or a file.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use super::{Claim, Kind, Outputs, is_stdout};
 use crate::error::CliError;
 
-/// Bytes that are written at once, unless somebody waits for them.
+/// Bytes that are written at once, unless a reader waits for them.
 const WRITTEN_AT_ONCE: usize = 1 << 16;
 
-/// Where estimates go.
+/// Destination of estimates.
 pub struct RowsOut {
     outputs: Outputs,
     claim: Option<Claim>,
@@ -33,7 +33,7 @@ impl RowsOut {
         Ok(Self { outputs, claim })
     }
 
-    /// What to write to. A file takes its place in [`RowsOut::publish`], unless it `grows`: of a live stream each row is
+    /// Opens the writer. A file takes its place in [`RowsOut::publish`], unless it `grows`: of a live stream each row is
     /// there at once, and stays if the stream breaks.
     ///
     /// # Errors

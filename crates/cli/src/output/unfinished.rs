@@ -1,8 +1,8 @@
 //! Outputs that are not whole yet: files and folders beside their places, under names of this program's own, each locked by
 //! who writes it.
 //!
-//! An interrupt (SIGINT) or a request to end (SIGTERM) removes them. What a killed process or a power cut has left behind is
-//! known by its name and by a lock that nobody holds: the next output in the same folder removes it.
+//! An interrupt (SIGINT) or a request to end (SIGTERM) removes them. Remains of a killed process or a power cut are
+//! recognised by their name and by a lock without a holder: the next output in the same folder removes them.
 
 use std::fs::{self, File, Permissions};
 use std::io;
@@ -11,15 +11,15 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::{Builder, NamedTempFile, TempDir};
 
-/// What their names begin with.
+/// Prefix of their names.
 const PREFIX: &str = ".ohmstrain-";
-/// What names of files end in, and those of folders.
+/// Suffix of names of files, and below of those of folders.
 const FILE: &str = ".part";
 const FOLDER: &str = ".parts";
 /// The file in such a folder that is locked.
 const LOCK: &str = "lock";
 
-/// What this process has begun; names of what is finished stay, and are used by nobody again.
+/// Unfinished files of this process; names of finished ones stay, and are not used again.
 static BEGUN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 fn begun() -> MutexGuard<'static, Vec<PathBuf>> {
@@ -51,7 +51,7 @@ impl Unfinished {
         }
     }
 
-    /// To write to.
+    /// Returns the file to write to.
     pub fn file(&self) -> &File {
         self.file.as_file()
     }
@@ -74,7 +74,7 @@ pub fn publish(all: Vec<Unfinished>) -> Result<(), (PathBuf, io::Error)> {
     Ok(())
 }
 
-/// Waits until the names in a folder are on the disk. Not every file system can be asked to.
+/// Waits until the names in a folder are on the disk. Not every file system supports it.
 pub fn sync_folder(folder: &Path) {
     if cfg!(unix) {
         let _ = File::open(folder).and_then(|folder| folder.sync_all());
@@ -104,7 +104,7 @@ impl UnfinishedFolder {
         }
     }
 
-    /// Where it is.
+    /// Returns its path.
     pub fn path(&self) -> &Path {
         self.folder.path()
     }
@@ -116,7 +116,7 @@ fn hold(lock: &File, path: &Path) -> bool {
     lock.lock().is_err() || path.exists()
 }
 
-/// Before the first output in a folder: removes what nobody will finish.
+/// Prepares the first output in a folder: removes the remains of processes that have ended.
 fn prepare(folder: &Path) {
     heed_signals();
     if begun().iter().any(|path| folder_of(path) == folder) {
@@ -168,7 +168,7 @@ fn heed_signals() {
 #[cfg(not(unix))]
 const fn heed_signals() {}
 
-/// Signals that whoever started this process wants it to ignore, a bit each, as far as the system says.
+/// Returns the signals that the parent of this process wants it to ignore, a bit each, if the system lists them.
 #[cfg(unix)]
 fn ignored_signals() -> u64 {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();

@@ -16,7 +16,7 @@ pub fn table(header: impl Into<Row>) -> Table {
     table
 }
 
-/// The same, of which cells are wrapped where it would be too wide.
+/// Creates a table whose cells are wrapped where it would be too wide.
 pub fn wrapped_table(header: impl Into<Row>) -> Table {
     let mut table = table(header);
     table.set_content_arrangement(ContentArrangement::Dynamic).set_width(COLUMNS as u16);

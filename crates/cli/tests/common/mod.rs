@@ -64,7 +64,7 @@ impl Bench {
         bench
     }
 
-    /// Where a file of the folder is.
+    /// Returns the path of a file of the folder.
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
@@ -105,17 +105,17 @@ pub fn files_in(folder: &std::path::Path) -> Vec<String> {
     names
 }
 
-/// What the program left behind.
+/// Result of a run of the program.
 pub struct Run {
     /// The arguments it was started with.
     pub command: String,
     /// Exit code.
     pub code: Option<i32>,
-    /// What it printed.
+    /// Its stdout.
     pub stdout: String,
-    /// What it said, without warnings.
+    /// Its stderr, without warnings.
     pub stderr: String,
-    /// What it warned of.
+    /// Its warnings.
     pub warnings: Vec<String>,
 }
 

@@ -8,7 +8,7 @@ pub use start::{BeliefOf, Start};
 use nalgebra::SVector;
 use ohmstrain_model::{Scalar, SwitchedModel, Symmetric};
 
-/// What is known of the state: mean and covariance of a Gaussian. `L = N (N + 1) / 2`.
+/// Mean and covariance of the state, a Gaussian distribution. `L = N (N + 1) / 2`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(
@@ -30,14 +30,14 @@ impl<T: Scalar, const N: usize, const L: usize> Belief<T, N, L> {
         Self { mean, covariance: Symmetric::from_diagonal(variance) }
     }
 
-    /// Before any reading: the model's long-run distribution.
+    /// Returns the belief before any reading: the model's long-run distribution.
     #[must_use]
     pub fn initial<const B: usize>(model: &SwitchedModel<T, B, N>) -> Self {
         let (mean, variance) = model.initial_distribution();
         Self::independent(mean, &variance)
     }
 
-    /// Whether every number is finite.
+    /// True if every number is finite.
     #[must_use]
     pub fn is_finite(&self) -> bool {
         self.mean.iter().all(|x| x.is_finite()) && self.covariance.is_finite()

@@ -2,7 +2,7 @@ use ohmstrain_model::{Scalar, SwitchedModel};
 
 use super::Belief;
 
-/// A sensor's model as something that knows what a filter carries: `N` and `L` follow from the model, and need not be said.
+/// Model of a sensor that determines a filter's state: `N` and `L` follow from the model, and need not be given.
 ///
 /// For up to four branches, with a baseline ([`WithBaseline`](ohmstrain_model::WithBaseline)) and without.
 ///
@@ -26,12 +26,12 @@ pub trait Start {
     /// The belief of its state.
     type Belief;
 
-    /// Before any reading: [`Belief::initial`].
+    /// Returns the belief before any reading: [`Belief::initial`].
     #[must_use]
     fn start(&self) -> Self::Belief;
 }
 
-/// What a filter of a model carries.
+/// Belief that a filter of a model carries.
 pub type BeliefOf<M> = <M as Start>::Belief;
 
 macro_rules! start {

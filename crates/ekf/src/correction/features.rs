@@ -9,15 +9,15 @@ pub const TIME_CONSTANTS_S: [f64; 6] = [0.25, 0.5, 1.0, 2.0, 8.0, 32.0];
 const FAR_FROM: [usize; 4] = [1, 3, 4, 5];
 /// The pairs among them whose differences are rates: of time constants τ/2 and τ.
 const RATES: [(usize, usize); 2] = [(0, 1), (2, 3)];
-/// A rate of a third of its usual size is still told apart well from twice that.
+/// Gain of the rates' tanh: a third of the usual rate is still well distinguished from twice that.
 pub const RATE_GAIN: f64 = 3.0;
 
 /// Readings farther away than this, in half ranges of the calibration's, are taken for this far: one gross error does not
 /// stay in the low-passes for minutes.
 pub const FARTHEST: f64 = 3.0;
 
-/// How many readings in a row that surprise the filter are passed over: spikes. Where more do, the law is at fault, and what it is
-/// corrected by needs the readings most.
+/// Most surprising readings in a row that are passed over as spikes. When more surprise, the law is at fault, and the
+/// features need the readings most.
 const PASSED_OVER: f64 = 3.0;
 
 /// The scale on which readings `R/R₀ - 1` are seen.
@@ -30,12 +30,12 @@ pub struct FeatureScale<T> {
     pub half_range: T,
     /// Usual size (standard deviation) of the two rates, in half ranges.
     pub rates: [T; 2],
-    /// Where low-passes start: a and b of a + b y at the first reading y.
+    /// Starting values of the low-passes: a and b of a + b y at the first reading y.
     pub starts: Starts<T>,
 }
 
 impl FeatureScale<f64> {
-    /// The same in another precision.
+    /// Converts it to another precision.
     #[must_use]
     pub fn to<T: Recordable>(&self) -> FeatureScale<T> {
         FeatureScale {
@@ -56,7 +56,7 @@ pub fn settled<T: Recordable>() -> Starts<T> {
     [[T::zero(), T::one()]; TIME_CONSTANTS_S.len()]
 }
 
-/// What a correction sees of the readings up to now: the scaled reading, its distances from low-passes of 0.5, 2, 8 and
+/// Features that a correction computes from the readings up to now: the scaled reading, its distances from low-passes of 0.5, 2, 8 and
 /// 32 s, and two rates, bounded by a tanh.
 ///
 /// A missing reading leaves the features as they were; the next one is taken over the whole time since the last.
@@ -67,15 +67,15 @@ pub struct ReadingFeatures<T> {
     pub(crate) low_passes: [T; TIME_CONSTANTS_S.len()],
     /// Time since the last reading.
     pub(crate) waited_s: T,
-    /// How many surprising readings have come in a row, three at most.
+    /// Number of surprising readings in a row, three at most.
     pub(crate) surprises: T,
-    /// Whether the last row had no reading, or one that was passed over.
+    /// True if the last row had no reading, or one that was passed over.
     pub(crate) waits: bool,
     pub(crate) now: Option<[T; FEATURES]>,
 }
 
 impl<T: Recordable> ReadingFeatures<T> {
-    /// Before the first reading.
+    /// Starts before the first reading.
     #[must_use]
     pub fn new(scale: FeatureScale<T>) -> Self {
         let low_passes = [T::zero(); TIME_CONSTANTS_S.len()];
@@ -88,7 +88,7 @@ impl<T: Recordable> ReadingFeatures<T> {
         self.step_with(dt_s, reading, |waited_s| TIME_CONSTANTS_S.map(|tau_s| Decay::over(waited_s, T::of(tau_s))))
     }
 
-    /// The same, where `decays` says what low-passes forget over a time, s.
+    /// Takes a step as [`Self::step`] does, with the `decays` of the low-passes over a time, s.
     pub fn step_with(
         &mut self,
         dt_s: T,
@@ -113,13 +113,13 @@ impl<T: Recordable> ReadingFeatures<T> {
         self.now
     }
 
-    /// The same; a reading that surprises the filter is missing here, unless the three readings before it did, too.
+    /// Takes a step as [`Self::step`] does; a reading that surprises the filter counts as missing, unless the three readings before it did, too.
     pub fn step_unless(&mut self, surprises: bool, dt_s: T, reading: Option<T>) -> Option<[T; FEATURES]> {
         let reading = self.unless(surprises, reading);
         self.step(dt_s, reading)
     }
 
-    /// What of a reading is for [`Self::step`]: one that surprises the filter is missing there, unless the three readings
+    /// Returns the reading to pass to [`Self::step`]: `None` for one that surprises the filter, unless the three readings
     /// before it did, too.
     pub fn unless(&mut self, surprises: bool, reading: Option<T>) -> Option<T> {
         let (before, most) = (self.surprises, T::of(PASSED_OVER));
@@ -128,7 +128,7 @@ impl<T: Recordable> ReadingFeatures<T> {
         if surprises && before < most { None } else { Some(reading) }
     }
 
-    /// Whether the last row had no reading, or one that was passed over.
+    /// True if the last row had no reading, or one that was passed over.
     #[must_use]
     pub fn is_waiting(&self) -> bool {
         self.waits

@@ -1,7 +1,7 @@
 use crate::Recordable;
 
 /// Exponential low-pass, τ L′ = y − L, exact for readings that move linearly from one known reading to the next, however
-/// long the step. It starts settled on the first reading, unless it is told where.
+/// long the step. By default it starts settled on the first reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LowPass<T> {
     tau_s: T,
@@ -10,7 +10,7 @@ pub struct LowPass<T> {
 }
 
 impl<T: Recordable> LowPass<T> {
-    /// Before the first reading; the time constant, s, is positive.
+    /// Creates a low-pass before the first reading; the time constant, s, is positive.
     #[must_use]
     pub fn new(tau_s: T) -> Self {
         Self { tau_s, last: None, value: T::zero() }
@@ -36,7 +36,7 @@ impl<T: Recordable> LowPass<T> {
     }
 }
 
-/// What a low-pass forgets over a step.
+/// Decay of a low-pass over a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Decay<T> {
     /// exp(-x), x the step in time constants.
@@ -46,14 +46,14 @@ pub struct Decay<T> {
 }
 
 impl<T: Recordable> Decay<T> {
-    /// Of a step, s, with a time constant, s.
+    /// Computes the decay over a step, s, with a time constant, s.
     #[must_use]
     pub fn over(dt_s: T, tau_s: T) -> Self {
         let x = dt_s / tau_s;
         Self { end: (-x).exp(), mean: if x > T::zero() { -(-x).exp_m1() / x } else { T::one() } }
     }
 
-    /// Where that takes a low-pass while readings go from one to the next.
+    /// Returns the low-pass at the end of the step, readings changing linearly from one to the next.
     #[must_use]
     pub fn moved(self, low_pass: T, last: T, reading: T) -> T {
         self.end * low_pass + (self.mean - self.end) * last + (T::one() - self.mean) * reading

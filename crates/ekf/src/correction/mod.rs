@@ -1,12 +1,12 @@
 //! The learned correction: strain from a filter's outputs and the readings' recent past, by two Gaussian processes.
 //!
-//! The law's error is systematic, and what it leaves of the strain can be learned from the rows that a sensor was
-//! calibrated on. A *direct* process says strain from features of the readings alone; a *residual* process says what the
-//! filter's strain lacks, from what the filter says and the same features. A smoother has two more direct processes, one
+//! The law's error is systematic, and the strain's error that it causes can be learned from the rows that a sensor was
+//! calibrated on. A *direct* process predicts strain from features of the readings alone; a *residual* process predicts the error
+//! of the filter's strain, from the filter's outputs and the same features. A smoother has two more direct processes, one
 //! of the readings' past and one of their future: neither is as easily led astray by a motion that begins as a known one
-//! and ends as none. They say their [`consensus`]. Far from the training rows the residual process says what the
-//! filter says, its variance is no smaller than the filter's, and the mixture's grows; so that a last process is heard there, which
-//! has learned what the law says of motions that the sensor was not seen in. It cannot lose its way as a filter can.
+//! and ends as another. Their predictions are combined by [`consensus`]. Far from the training rows the residual process returns the
+//! filter's strain, its variance is no smaller than the filter's, and the mixture's grows. There a last process counts, which
+//! has learned the law's answer to motions that the sensor was not seen in. It cannot lose its way as a filter can.
 //!
 //! # Policy
 //! - Configuration, borrowed as slices that may lie in flash, is apart from state ([`ReadingFeatures`]); no heap, no panic.
@@ -58,7 +58,7 @@ const NOVEL: f64 = 0.06;
 /// The square of that distance beyond which inputs are new.
 const NEW: f64 = 5.0;
 
-/// Where an input lay in the training rows.
+/// Distribution of an input over the training rows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InputScale<T> {
     /// Mean.
@@ -108,7 +108,7 @@ pub struct Correction<'a, T, const D: usize, const S: usize = 0> {
 /// A process that sees features of one side of time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OneSided<'a, T, const D: usize> {
-    /// What it says.
+    /// The Gaussian process.
     pub process: Process<'a, T, D>,
     /// The input that the linear part of its kernel takes.
     pub first: usize,
@@ -121,7 +121,7 @@ pub struct Simulated<'a, T, const D: usize> {
     pub rows: Rows<'a, T, D>,
     /// Scales of the inputs.
     pub scales: &'a [InputScale<T>; D],
-    /// What the rows say.
+    /// The Gaussian process of the rows.
     pub process: Process<'a, T, D>,
 }
 
@@ -130,15 +130,15 @@ pub struct Simulated<'a, T, const D: usize> {
 pub struct Corrected<T, const S: usize = 0> {
     /// The result.
     pub strain: Gaussian<T>,
-    /// What the direct process says.
+    /// Strain by the direct process.
     pub direct: Gaussian<T>,
-    /// What the one-sided processes say.
+    /// Strains by the one-sided processes.
     pub one_sided: [Gaussian<T>; S],
-    /// What filter and residual process say together.
+    /// Strain by the filter and the residual process together.
     pub residual: Gaussian<T>,
-    /// What the simulated rows say.
+    /// Strain by the process of the simulated rows.
     pub simulated: Option<Gaussian<T>>,
-    /// How little the inputs resemble the training rows, 0 to 1.
+    /// Novelty: 0 if the inputs resemble the training rows, 1 if they do not at all.
     pub novelty: T,
 }
 
@@ -166,7 +166,7 @@ impl<T: Real, const D: usize, const S: usize> Correction<'_, T, D, S> {
         standardised(self.scales, inputs).inputs
     }
 
-    /// What the simulated rows say.
+    /// Returns the strain by the process of the simulated rows.
     #[inline(always)]
     fn of_simulated<V: Several<Number = T>>(&self, like: V, inputs: &[T; D], of: &Simulated<'_, T, D>) -> Gaussian<T> {
         let Standardised { inputs: x, outside } = standardised(of.scales, inputs);
@@ -186,7 +186,7 @@ impl<T: Real, const D: usize, const S: usize> Correction<'_, T, D, S> {
 }
 
 impl<T: Recordable, const D: usize, const S: usize> Correction<'_, T, D, S> {
-    /// What filter and residual process say together, and how little the inputs resemble the training rows.
+    /// Returns the strain by the filter and the residual process together, and the novelty of the inputs.
     pub(crate) fn of_residual(&self, said: Said<T>, outside: T, filtered: T) -> (Gaussian<T>, T) {
         let novelty = T::one() - (T::one() - said.unknown) * (-outside / T::of(NEW)).falling();
         (self.widened(said, &self.residual, outside, filtered), novelty)
@@ -197,7 +197,7 @@ impl<T: Recordable, const D: usize, const S: usize> Correction<'_, T, D, S> {
         Process { least_variance: self.residual.least_variance.max(filtered.variance), ..self.residual }
     }
 
-    /// What voices say that were mixed.
+    /// Returns the corrected strain from the mixture of the voices.
     pub(crate) fn learned(&self, mixed: Gaussian<T>, novelty: T, birge: T) -> Gaussian<T> {
         let variance = mixed.variance * self.variance_factor + T::of(NOVEL) * self.strain_variance * novelty;
         let anywhere = self.limits.variance_of_anywhere();
@@ -277,10 +277,10 @@ impl<T: Real, const D: usize, const S: usize> Work<T> for Correcting<'_, T, D, S
     }
 }
 
-/// What the voices of a correction say together. A filter's two are a [`mixture`]. A smoother's are one, too, after the variance of
-/// each has grown by what is left of its distance from the mixture of the others, squared, once both variances have explained what
-/// they can: of four voices that see different things one that contradicts all others is more likely wrong than it says, of two
-/// nobody knows which.
+/// Combines the voices of a correction. A filter's two voices are combined as a [`mixture`]. A smoother's are, too, after each voice's
+/// variance has grown by the part of its squared distance from the mixture of the others that both variances do not explain. Of four
+/// voices with different inputs, one that contradicts all others is more likely wrong than it states; of two, nobody knows which
+/// one is wrong.
 #[must_use]
 pub fn consensus<T: Real, const S: usize>(
     direct: Gaussian<T>,

@@ -32,13 +32,14 @@ pub struct Process<'a, T, const D: usize> {
 }
 
 impl<T: Recordable, const D: usize> Process<'_, T, D> {
-    /// Of squares in each input the sum, by relevance; one in the input `first` counts as one.
+    /// Returns the sum of the squared distances in each input, weighted by relevance; the one in the input `first` has weight one.
     pub(crate) fn distance(&self, squares: &[T; D], first: usize) -> T {
         let sum = squares.iter().zip(&self.relevance).fold(T::zero(), |sum, (square, by)| sum + *square * *by);
         self.relevance.get(first).map_or(sum, |first| sum / *first)
     }
 
-    /// What the process says, of the weighted sum of all kernels and of what those of the inducing rows explain; `first` is the first input.
+    /// Returns the process's prediction from the weighted sum of all kernels and the variance that the inducing rows
+    /// explain; `first` is the first input.
     pub(crate) fn said(&self, mean: T, explained: T, first: T) -> Said<T> {
         let prior = T::one() + linear(first * first);
         let unknown = ((prior - explained) / prior).max(T::zero()).min(T::one());
@@ -60,7 +61,7 @@ impl<T: Real, const D: usize> Process<'_, T, D> {
     }
 }
 
-/// What a process says at one input.
+/// Prediction of a process at one input.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Said<T> {
     pub strain: Gaussian<T>,
@@ -74,7 +75,7 @@ const ROOM: usize = INDUCING + MOST_LANES - 1;
 /// Kernels with the training rows, row by row.
 pub(super) struct Kernels<T> {
     mean: T,
-    /// With the inducing rows, and room for what fills the last vector.
+    /// Kernels with the inducing rows, padded to whole vectors.
     inducing: [T; ROOM],
     rows: usize,
 }
@@ -104,7 +105,7 @@ impl<T: Real> Kernels<T> {
         self.rows += count;
     }
 
-    /// What the process says; `first` is the first input.
+    /// Returns the process's prediction; `first` is the first input.
     #[inline(always)]
     pub(super) fn said<V: Several<Number = T>, const D: usize>(
         &self,

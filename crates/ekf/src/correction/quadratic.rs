@@ -1,6 +1,6 @@
 use crate::Recordable;
 
-/// `Σ (lᵢ + Σⱼ≤ᵢ qᵢⱼ xⱼ) xᵢ` of standardised inputs: most of what a smooth Gaussian process says, at little cost.
+/// `Σ (lᵢ + Σⱼ≤ᵢ qᵢⱼ xⱼ) xᵢ` of standardised inputs: most of a smooth Gaussian process, at little cost.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quadratic<'a, T> {
     /// lᵢ.

@@ -1,6 +1,6 @@
 use crate::kernel::Several;
 
-/// How many rows stand side by side: the lanes of the vectors that [`Correction`](super::Correction) computes in.
+/// Number of rows side by side: the lanes of the vectors that [`Correction`](super::Correction) computes in.
 pub const BLOCK: usize = 4;
 
 /// Rows side by side: each of D inputs of [`BLOCK`] rows. A last block may have fewer; what is in their places does not count.
@@ -20,7 +20,7 @@ impl<'a, T, const D: usize> Rows<'a, T, D> {
         Self { blocks, count }
     }
 
-    /// Looks at the rows, as many at a time as there are lanes.
+    /// Calls `see` with the rows, as many at a time as there are lanes.
     #[inline(always)]
     pub(super) fn side_by_side<V: Several<Number = T>>(self, like: V, mut see: impl FnMut(SideBySide<'a, V, D>)) {
         let mut left = self.count;

@@ -21,7 +21,7 @@ impl<'a, T> Triangle<'a, T> {
         Self { columns, side }
     }
 
-    /// How many rows it has.
+    /// Number of rows.
     #[must_use]
     pub const fn side(&self) -> usize {
         self.side
@@ -60,7 +60,7 @@ pub fn stripes<T: Scalar>(side: usize, entry: impl Fn(usize, usize) -> T) -> imp
     })
 }
 
-/// Where the columns of [stripes] stand: the first of their rows, and the column.
+/// Returns the places of the columns of [stripes]: the first of their rows, and the column.
 pub fn stripe_places(side: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..side).step_by(BLOCK).flat_map(move |first| (first..side).map(move |j| (first, j)))
 }

@@ -1,6 +1,6 @@
 use core::fmt;
 
-/// Why a Kalman filter's step was not taken. The distribution that was passed in is still the best there is.
+/// Reason for refusing a Kalman filter's step. The distribution that was passed in is still the best there is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum KalmanError {

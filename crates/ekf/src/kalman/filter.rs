@@ -61,7 +61,7 @@ pub struct Prediction<T, const N: usize> {
     pub prior: Normal<T, N>,
 }
 
-/// Everything that one step computed. What stands for a missing entry of the reading is zero.
+/// Results of one step. For a missing entry of the reading they are zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step<T, const N: usize, const M: usize> {
     /// The transition; that of an update alone stands still.
@@ -117,7 +117,7 @@ pub trait Filter<T: Scalar, const N: usize, const M: usize> {
         condition(prior, &self.reading_line(prior)?, reading)
     }
 
-    /// The same with the reading's line found anew, `iterations` times, around what the last one gave: the iterated
+    /// Updates with the reading's line found again, `iterations` times, around the last result: the iterated
     /// Kalman filter, Gauss and Newton's method for the most probable state. `update` is one iteration.
     ///
     /// # Errors

@@ -15,7 +15,7 @@ pub struct Maximum<const P: usize> {
     pub iterations: usize,
 }
 
-/// Why no maximum was found.
+/// Reason for finding no maximum.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum NoMaximum {
@@ -54,7 +54,7 @@ impl core::error::Error for NoMaximum {}
 const MOST_ITERATIONS: usize = 200;
 /// A step's expected gain in log-likelihood at which the search ends: a hundred-thousandth of a standard error's.
 const ENOUGH: f64 = 1e-10;
-/// The same where rounding hides what a step gains: a thousandth of a standard error.
+/// Expected gain at which the search ends where rounding hides it: a thousandth of a standard error.
 const ENOUGH_IN_ROUNDING: f64 = 1e-6;
 /// Variance of a parameter over what it were if the others were known. Curvatures are good to six digits.
 const MOST_INFLATION: f64 = 1e6;

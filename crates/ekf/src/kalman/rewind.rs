@@ -50,7 +50,7 @@ where
     /// taken last. Returns the state after the latest reading.
     ///
     /// # Errors
-    /// [`KalmanError::TimeOutOfReach`], or what a step says. Nothing has changed then.
+    /// [`KalmanError::TimeOutOfReach`], or the error of a step. Nothing has changed then.
     pub fn take(&mut self, time_s: T, reading: [Option<T>; M]) -> Result<Normal<T, N>, KalmanError> {
         if !(time_s >= self.before.0 && time_s.is_finite()) {
             return Err(KalmanError::TimeOutOfReach);

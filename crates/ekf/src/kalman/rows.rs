@@ -33,7 +33,7 @@ pub(super) struct Sources<'a, T, const N: usize, const K: usize> {
     pub(super) noise: &'a SVector<T, K>,
 }
 
-/// What rounding has left of a row.
+/// Digits of a row that rounding has left.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Digits {
     /// A row as good as any.

@@ -5,7 +5,7 @@ use super::factor::Factor;
 use super::rows::sum;
 use super::{Affine, Filter, KalmanError, Model, Normal};
 
-/// Unscented Kalman filter: both functions of the model go through 2 N + 1 sigma points, and no Jacobian is asked for.
+/// Unscented Kalman filter: both functions of the model go through 2 N + 1 sigma points, and no Jacobian is needed.
 ///
 /// Points stand at x and x ± √N times a column of P's root, with α = 1, κ = 0, β = 2: the centre has no weight in the
 /// mean and 2 in the covariance, so that no weight is negative. New points are drawn for the reading from the prediction

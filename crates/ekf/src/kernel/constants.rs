@@ -2,22 +2,22 @@ use ohmstrain_model::{Branch, Response, Scalar, SensorLaw, StrainRange, Switched
 
 use super::{Lanes, Regions};
 
-/// What a step needs besides the belief and does not change from step to step of one length.
+/// Constants of a step: all it needs besides the belief, the same for all steps of one length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct StepConstants<T, const B: usize> {
     /// Transition of the motion.
     pub motion: [[T; 2]; 2],
-    /// What the rate's new variance takes from the old ones of strain, of both, of rate.
+    /// Coefficients of the rate's new variance: of the old variance of strain, the covariance, and the old variance of rate.
     pub rate_squares: [T; 3],
-    /// What the pull toward the mean strain adds.
+    /// Contribution of the pull toward the mean strain.
     pub input: [T; 2],
-    /// What a moving phase's mean rate adds while stretching.
+    /// Contribution of a moving phase's mean rate while stretching.
     pub phase_input: [T; 2],
     /// Covariances of ε with ε, v with ε, v with v.
     pub noise: [T; 3],
     /// Change of the rate with old strain and rate.
     pub rate_change: [T; 2],
-    /// As [`SwitchedStep::averaging`](ohmstrain_model::SwitchedStep::averaging).
+    /// See [`SwitchedStep::averaging`](ohmstrain_model::SwitchedStep::averaging).
     pub averaging: T,
     pub branches: [BranchConstants<T, B>; B],
     pub baseline_decay: T,
@@ -49,7 +49,7 @@ pub(crate) struct BranchConstants<T, const B: usize> {
 }
 
 impl<T: Scalar, const B: usize> StepConstants<T, B> {
-    /// Of steps of `dt_s > 0` seconds; a rate is clear if its square is not less than `clear` variances.
+    /// Computes the constants of steps of `dt_s > 0` seconds; a rate is clear if its square is not less than `clear` variances.
     pub(crate) fn new<const N: usize>(model: &SwitchedModel<T, B, N>, dt_s: T, clear: T) -> Self {
         let step = model.prepare(dt_s);
         let response: &Response<T, B> = step.response();
@@ -161,18 +161,18 @@ impl<T: Scalar> Gain<T> {
     }
 }
 
-/// The gains of a branch at a sum of strains: what is not asked for is not computed.
+/// Gains of a branch at a sum of strains: each is computed when it is used.
 #[derive(Clone, Copy)]
 pub(super) struct GainsAt<'a, V: Lanes, const B: usize> {
     regions: &'a Regions<V::Number, [Gains<V::Number>; B]>,
-    /// Those of all lanes, if they are in one region.
+    /// Gains of all lanes, if they are in one region.
     common: Option<&'a [Gains<V::Number>; B]>,
     pub strain_sum: V,
     i: usize,
 }
 
 impl<T: Scalar, const B: usize> Regions<T, [Gains<T>; B]> {
-    /// Those of the first branch; see [`GainsAt::of`].
+    /// Returns the gains of the first branch; see [`GainsAt::of`].
     #[inline(always)]
     pub(super) fn gains<V: Lanes<Number = T>>(&self, strain_sum: V) -> GainsAt<'_, V, B> {
         GainsAt { regions: self, common: self.common(strain_sum), strain_sum, i: 0 }
@@ -180,7 +180,7 @@ impl<T: Scalar, const B: usize> Regions<T, [Gains<T>; B]> {
 }
 
 impl<V: Lanes, const B: usize> GainsAt<'_, V, B> {
-    /// Those of another branch.
+    /// Returns the gains of another branch.
     #[inline(always)]
     pub(super) fn of(self, i: usize) -> Self {
         Self { i, ..self }

@@ -10,7 +10,7 @@ pub trait Curve<T: Scalar>: Copy {
     /// g(ε) and g′(ε).
     fn value_and_slope<V: Lanes<Number = T>>(&self, strain: V) -> (V, V);
 
-    /// The line that stands for g where strain has a variance: without a say in it, the tangent at the mean.
+    /// Returns the line that stands for g where strain has a variance; by default the tangent at the mean.
     #[inline(always)]
     fn line<V: Lanes<Number = T>>(&self, strain: V, _variance: V) -> CurveLine<V> {
         let (value, slope) = self.value_and_slope(strain);
@@ -18,7 +18,7 @@ pub trait Curve<T: Scalar>: Copy {
     }
 }
 
-/// What stands for a curve in an update.
+/// Line that approximates a curve in an update.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CurveLine<V> {
     /// Expected value.
@@ -146,7 +146,7 @@ impl<T: Scalar, G: Curve<T>> Curve<T> for SigmaPoints<G> {
     }
 }
 
-/// What holds below, within and above a range: outside of it a law goes on with numbers of its own, not by clamping.
+/// Values for places below, within and above a range: outside of it a law goes on with numbers of its own, not by clamping.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Regions<T, V> {
     lower: T,
@@ -161,13 +161,13 @@ impl<T: Scalar, V> Regions<T, V> {
         Self { lower: range.lower, upper: range.upper, within, below, above }
     }
 
-    /// What holds at all places, if that is the same; within, if a place is not a number.
+    /// Returns the value of all places if they share one; the value within the range if a place is NaN.
     #[inline(always)]
     pub(crate) fn common<L: Lanes<Number = T>>(&self, places: L) -> Option<&V> {
         places.region(self.lower, self.upper, [&self.below, &self.within, &self.above])
     }
 
-    /// Of numbers that hold below, within and above the range, the one that holds at each place.
+    /// Chooses, at each place, among numbers for below, within and above the range.
     #[inline(always)]
     pub(crate) fn chosen<L: Lanes<Number = T>>(&self, places: L, [below, within, above]: [T; 3]) -> L {
         let (is_below, is_above) = (places.less(places.with(self.lower)), places.with(self.upper).less(places));

@@ -3,7 +3,7 @@
 use super::tail::Tail;
 use super::{InVectors, Lanes, Several};
 
-/// What `2ⁿ eʳ` takes in a precision.
+/// Constants of `2ⁿ eʳ` in one precision.
 pub(crate) struct Falling<T: 'static> {
     /// Exponentials of less are zero.
     pub least: T,
@@ -28,7 +28,7 @@ pub(super) const INVERSE_FACTORIALS: [f64; 14] = {
     inverses
 };
 
-/// Up to k = 7 in single precision: it is no work for a program.
+/// Inverse factorials up to k = 7, in single precision; constants, since a program need not compute them.
 pub(super) const INVERSE_FACTORIALS_F32: [f32; 8] = {
     let mut inverses = [1.0; 8];
     let mut k = 1;
@@ -52,7 +52,7 @@ pub(crate) trait Falls: Lanes<Number: InVectors> {
         exponential(self)
     }
 
-    /// What a standard normal has above these borders, where it is `wanted`.
+    /// Returns the upper tail of a standard normal above these borders, in the lanes `wanted`.
     #[must_use]
     #[inline(always)]
     fn tail(self, wanted: Self::Mask) -> Tail<Self> {
@@ -103,7 +103,7 @@ mod tests {
         assert!(f64::NAN.falling().is_nan());
     }
 
-    /// The same in single precision, against double.
+    /// Compares the exponentials in single precision with those in double.
     #[test]
     fn exponentials_in_single_precision() {
         for k in 0..87_000 {

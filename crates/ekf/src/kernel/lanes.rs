@@ -2,7 +2,7 @@ use core::ops::{Add, AddAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
 use ohmstrain_model::Scalar;
 
-/// What the kernel computes with: a number, or a vector with a number of another sensor or hypothesis in each lane.
+/// Numbers that the kernel computes with: a scalar, or a vector with a number of another sensor or hypothesis in each lane.
 pub trait Lanes:
     Copy
     + Add<Output = Self>
@@ -13,15 +13,15 @@ pub trait Lanes:
     + Sub<Output = Self>
     + SubAssign
 {
-    /// What there is one of in every lane.
+    /// Number in one lane.
     type Number: Scalar;
     /// A truth for every lane.
     type Mask: Copy;
 
-    /// How many lanes there are.
+    /// Number of lanes.
     const WIDTH: usize;
 
-    /// The same number in all lanes, of which there are as many as here.
+    /// Returns the same number in all lanes, of which there are as many as here.
     #[must_use]
     fn with(self, number: Self::Number) -> Self;
     /// `self · factor + term`, in one rounding where the processor does that for vectors.
@@ -36,30 +36,30 @@ pub trait Lanes:
     /// Square roots.
     #[must_use]
     fn root(self) -> Self;
-    /// Where it is less.
+    /// Lanes where `self` is less than `other`.
     fn less(self, other: Self) -> Self::Mask;
-    /// Where it is not negative; not where it is no number.
+    /// Lanes that are not negative; false for NaN.
     fn not_negative(self) -> Self::Mask;
-    /// Where it is finite.
+    /// Lanes that are finite.
     fn finite(self) -> Self::Mask;
-    /// Where both are true.
+    /// Lanes where both masks are set.
     fn both(a: Self::Mask, b: Self::Mask) -> Self::Mask;
-    /// Where one of both is true.
+    /// Lanes where either mask is set.
     fn either(a: Self::Mask, b: Self::Mask) -> Self::Mask;
-    /// Where the first is true and the second is not.
+    /// Lanes where the first mask is set and the second is not.
     fn without(a: Self::Mask, b: Self::Mask) -> Self::Mask;
-    /// Whether it is true nowhere.
+    /// True if the mask is set in no lane.
     fn none(mask: Self::Mask) -> bool;
-    /// Whether it is true everywhere.
+    /// True if the mask is set in all lanes.
     fn all(mask: Self::Mask) -> bool;
     /// `yes` where the mask is true, else `no`.
     fn pick(mask: Self::Mask, yes: Self, no: Self) -> Self;
     /// Exponentials.
     #[must_use]
     fn exponential(self) -> Self;
-    /// What holds where the mask is true or where it is not, if that is the same in all lanes.
+    /// Returns `yes` if the mask is set in all lanes, `no` if in none, and `None` otherwise.
     fn one_of<'a, R>(mask: Self::Mask, yes: &'a R, no: &'a R) -> Option<&'a R>;
-    /// What holds below, within or above a range, if the same holds for all lanes; within, where it is not a number.
+    /// Returns the row for below, within or above a range if the same row applies to all lanes; NaN counts as within.
     fn region<R>(self, lower: Self::Number, upper: Self::Number, rows: [&R; 3]) -> Option<&R>;
 
     /// `self · factor + term` with the same factor for all.
@@ -168,7 +168,7 @@ impl<T: Scalar> Lanes for T {
         if mask { yes } else { no }
     }
 
-    /// Never inlined: what a compiler knows to be an exponential it may compute for gauges that have none.
+    /// Computes the exponential, never inlined: a compiler that knows it may compute it for gauges that have none.
     #[inline(never)]
     fn exponential(self) -> T {
         self.exp()

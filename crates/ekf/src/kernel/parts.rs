@@ -94,7 +94,7 @@ fn put<'a, V: Lanes + 'a>(places: &mut impl Iterator<Item = &'a mut V>, number: 
 }
 
 impl<V: Lanes, const B: usize> Parts<V, B> {
-    /// Everything known to be `nothing`.
+    /// Returns parts that are all known to be `nothing`.
     pub(crate) const fn certain(nothing: V) -> Self {
         Self {
             strain: nothing,
@@ -107,12 +107,12 @@ impl<V: Lanes, const B: usize> Parts<V, B> {
         }
     }
 
-    /// Whether the last of `n` states is a baseline.
+    /// True if the last of `n` states is a baseline.
     pub(crate) const fn has_baseline(n: usize) -> bool {
         n == B + 3
     }
 
-    /// From means, and the lower triangle of covariances row by row.
+    /// Reads parts from means, and from the lower triangle of covariances row by row.
     #[inline(always)]
     pub(crate) fn read<'a, const N: usize>(
         means: &mut impl Iterator<Item = &'a V>,
@@ -158,8 +158,8 @@ impl<V: Lanes, const B: usize> Parts<V, B> {
         }
     }
 
-    /// Where a step has left numbers: no variance is negative and nothing is infinite or not a number. `extra` is a number
-    /// that shall be finite too.
+    /// Lanes where a step has left valid numbers: no variance is negative, and nothing is infinite or NaN. `extra` is another number
+    /// that must be finite.
     #[inline(always)]
     pub(crate) fn is_sound<const N: usize>(&self, extra: V) -> V::Mask {
         let mut positive = V::both(self.strain_variance.not_negative(), self.rate_variance.not_negative());
@@ -195,7 +195,7 @@ impl<V: Lanes, const B: usize> Parts<V, B> {
     expect(dead_code, reason = "only vectors ask")
 )]
 impl<V: Several, const B: usize> Parts<V, B> {
-    /// Of as many beliefs as there are lanes.
+    /// Gathers as many beliefs as there are lanes.
     #[inline(always)]
     pub(crate) fn gathered<'a, const N: usize, const L: usize>(
         like: V,

@@ -5,7 +5,7 @@ use ohmstrain_model::{LEAST_LEFT, Phase, Scalar, Turning};
 use super::constants::{BranchConstants, Gain, GainsAt, StepConstants};
 use super::{Lanes, Part, Parts, RateSpread, SparseEkf, Switch};
 
-/// What a step does to one branch. The gain grows with the sum of old and new strain: the old one's share is in `row`, the
+/// Effect of a step on one branch. The gain grows with the sum of old and new strain: the old one's share is in `row`, the
 /// new one's is added when its covariances are known.
 #[derive(Clone, Copy)]
 pub(super) struct Driven<V> {
@@ -15,14 +15,14 @@ pub(super) struct Driven<V> {
     pub pull: V,
     /// Answer to old strain and rate.
     pub row: [V; 2],
-    /// What is left of the covariances with old strain and rate, and these with what the motion adds.
+    /// Decayed covariances with old strain and rate, and these with what the motion adds.
     kept: [V; 2],
     carried: [V; 2],
-    /// What a unit of path in the other direction would have changed.
+    /// Change that a unit of path in the other direction would have caused.
     jump: V,
 }
 
-/// How a branch is driven: its change, gain and pull; its jump, and the variance of the rate's split, where that is open.
+/// Drive of a branch: its change, gain and pull; its jump, and the variance of the rate's split, if the direction is open.
 #[derive(Clone, Copy)]
 struct Drive<V> {
     change: V,
@@ -32,14 +32,14 @@ struct Drive<V> {
     left: V,
 }
 
-/// How all branches are driven.
+/// Drives of all branches.
 pub(super) struct Driving<V, const B: usize> {
     drives: [Drive<V>; B],
     /// Variance of the path whose direction stays open.
     unexplained: V,
 }
 
-/// What is known of the direction of a step that moves.
+/// Knowledge of the direction of a step that moves.
 #[derive(Clone, Copy)]
 pub(crate) enum Course<V> {
     /// Nothing but the rate's distribution.
@@ -79,7 +79,7 @@ pub(super) fn sum<V: Lanes>(start: V, [a0, a1]: [V; 2], [b0, b1]: [V; 2]) -> V {
     a1.mul_add(b1, a0.mul_add(b0, start))
 }
 
-/// The same number twice in all lanes.
+/// Returns the same two numbers in all lanes.
 #[inline(always)]
 fn pair<V: Lanes>(like: V, [a, b]: [V::Number; 2]) -> [V; 2] {
     [like.with(a), like.with(b)]
@@ -98,7 +98,7 @@ impl<T: Scalar, S, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
         self.predict_as(parts, course)
     }
 
-    /// The same with a switch of the caller's, which only an uncertain course asks: that of the filter may not know these lanes.
+    /// Predicts with a switch of the caller's, used by an uncertain course only: that of the filter may not work on these lanes.
     #[inline(always)]
     pub(crate) fn predict_as<V: Lanes<Number = T>, X: Switch<V>>(
         &self,
@@ -115,7 +115,7 @@ impl<T: Scalar, S, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
         RateSpread::new(parts.rate_variance)
     }
 
-    /// Moves strain and rate, means and covariances of theirs, and says how the branches are driven meanwhile.
+    /// Moves strain and rate, with their means and covariances, and returns the drive of the branches meanwhile.
     #[inline(always)]
     pub(super) fn drive<V: Lanes<Number = T>, X: Switch<V>>(
         &self,
@@ -234,7 +234,7 @@ fn relax<V: Lanes, const B: usize>(part: &mut Part<V, B>, decay: V::Number, deca
     }
 }
 
-/// As [`ohmstrain_model::correlated_steps`]; a rate that is known has nothing to persist.
+/// See [`ohmstrain_model::correlated_steps`]; a rate that is known has nothing to persist.
 #[inline(always)]
 fn correlated_steps<V: Lanes>(ahead: V, together: V, fresh: V) -> V {
     let (square, both) = (ahead * ahead, together * together);
@@ -243,21 +243,21 @@ fn correlated_steps<V: Lanes>(ahead: V, together: V, fresh: V) -> V {
     (square + both).over(V::pick(least.less(left), left, least))
 }
 
-/// Of a branch driven with a gain in a direction that is known.
+/// Returns the drive of a branch with a gain in a direction that is known.
 #[inline(always)]
 fn driven_by<V: Lanes>(gain: Gain<V>, strain_sum: V, unit: V) -> Drive<V> {
     let (here, zero) = (gain.at(strain_sum), unit.nothing());
     Drive { change: here * unit, gain: here, pull: gain.growth * unit, jump: zero, left: zero }
 }
 
-/// Of a branch whose direction is known.
+/// Returns the drive of a branch whose direction is known.
 #[inline(always)]
 fn known<V: Lanes, const B: usize>(gains: GainsAt<'_, V, B>, unit: V, phase: Phase) -> Drive<V> {
     let gain = if matches!(phase, Phase::Extend) { gains.extend() } else { gains.retract() };
     driven_by(gain, gains.strain_sum, unit)
 }
 
-/// The same where the rate may have turned around on the way.
+/// Returns the drive of a branch if the rate may have turned around on the way.
 #[inline(always)]
 fn within<V: Lanes, const B: usize>(
     branch: &BranchConstants<V::Number, B>,
@@ -282,7 +282,7 @@ fn within<V: Lanes, const B: usize>(
     }
 }
 
-/// The same where the rate's distribution decides.
+/// Returns the drive of a branch if the rate's distribution decides the direction.
 #[inline(always)]
 fn split<V: Lanes, S: Switch<V>, const B: usize>(
     branch: &BranchConstants<V::Number, B>,

@@ -1,4 +1,4 @@
-//! What a sign-split filter does to the rate alone.
+//! Operations of a sign-split filter on the rate alone.
 
 use ohmstrain_model::{Phase, RateChange, Scalar, TURNING, Turning, TurningNumbers};
 
@@ -8,7 +8,7 @@ use super::{Curve, Falls, Lanes, Part, Parts, SparseEkf, Switch};
 use crate::Gaussian;
 
 impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, B, N, G> {
-    /// What the pull toward the mean strain and the mean rate of the phase on a `side` of zero, 1 or -1, add to the rate.
+    /// Returns what the pull toward the mean strain and the mean rate of the phase on a `side` of zero, 1 or -1, add to the rate.
     #[inline(always)]
     fn push<V: Lanes<Number = T>>(&self, side: V) -> V {
         side.scale_add(self.step.phase_input[1], side.with(self.step.input[1]))
@@ -22,7 +22,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         Gaussian { mean, variance }
     }
 
-    /// Where next to nothing of a prediction is on its `side` of zero.
+    /// Lanes where next to no probability of a prediction is on its `side` of zero.
     #[inline(always)]
     pub(crate) fn is_hopeless<V: Lanes<Number = T>>(&self, side: V, from: &Parts<V, B>) -> V::Mask {
         let ahead = self.rate_ahead(side, from);
@@ -34,7 +34,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         V::both(behind, ahead.variance.scale(T::of(HOPELESS * HOPELESS)).less(toward * toward))
     }
 
-    /// How a rate on a `side` of zero changes over a step, positive away from zero.
+    /// Returns the change of a rate on a `side` of zero over a step, positive away from zero.
     #[inline(always)]
     fn rate_change<V: Lanes<Number = T>>(&self, side: V, from: &Parts<V, B>) -> RateChange<V> {
         let (step, none) = (&self.step, side.nothing());
@@ -42,7 +42,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         RateChange { expected: side * expected, spread, noise: side.with(step.noise[2]) }
     }
 
-    /// What a rate on a `side` of zero leaves open over a step where it is `wanted`, as
+    /// Returns the path that a rate on a `side` of zero leaves open over a step, in the lanes `wanted`. It is
     /// [`SwitchedModel::turning`](ohmstrain_model::SwitchedModel::turning) of the model.
     #[inline(always)]
     pub(crate) fn turning<V: Falls<Number = T>, X: Switch<V>>(
@@ -81,13 +81,13 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
 /// Deviations of the rate beyond zero at which less than a thousandth of the prediction is left, too little to follow.
 const HOPELESS: f64 = 3.090_232_306_167_813_5;
 
-/// On which side of zero the rates of a moving phase are, 1 or -1.
+/// Returns the side of zero of a moving phase's rates, 1 or -1.
 #[inline(always)]
 pub(crate) fn side_of<V: Lanes>(phase: Phase, like: V) -> V {
     like.literal(if phase == Phase::Retract { -1.0 } else { 1.0 })
 }
 
-/// What motion by `by` from a belief adds to a mean, and to a variance.
+/// Adds the effect of motion by `by` from a belief to a mean and to a variance.
 #[inline(always)]
 fn answered<V: Lanes, const B: usize>(by: [V::Number; 2], (mean, variance): (V, V), from: &Parts<V, B>) -> (V, V) {
     let like = from.strain;
@@ -97,7 +97,7 @@ fn answered<V: Lanes, const B: usize>(by: [V::Number; 2], (mean, variance): (V, 
 }
 
 impl<T: Scalar> Gaussian<T> {
-    /// The same in all lanes, of which there are as many as here.
+    /// Returns the same Gaussian in all lanes, of which there are as many as here.
     #[inline(always)]
     pub(crate) fn in_lanes<V: Lanes<Number = T>>(self, like: V) -> Gaussian<V> {
         Gaussian { mean: like.with(self.mean), variance: like.with(self.variance) }
@@ -105,7 +105,7 @@ impl<T: Scalar> Gaussian<T> {
 }
 
 impl<V: Lanes, const B: usize> Parts<V, B> {
-    /// Draws the rate anew where a phase `begins`, independent of everything else.
+    /// Replaces the rate by a new one where a phase `begins`, independent of everything else.
     #[inline(always)]
     pub(crate) fn renew_rate(&mut self, fresh: Gaussian<V>, begins: V::Mask) {
         let zero = self.rate.nothing();
@@ -117,8 +117,8 @@ impl<V: Lanes, const B: usize> Parts<V, B> {
         }
     }
 
-    /// What a `side` of zero has of rates that are certain to be on it or not, or so far away that the tail beyond zero, `clear`
-    /// squared deviations off, is not cut off; and where, of what is `wanted`, it is.
+    /// Returns the probability of a `side` of zero for rates that are certain to be on it or not, or so far away that the tail beyond zero,
+    /// `clear` squared deviations off, is not cut off; and the lanes, among those `wanted`, where the tail is cut off.
     #[inline(always)]
     pub(crate) fn certain_of_side(&self, side: V, clear: V::Number, wanted: V::Mask) -> (V, V::Mask) {
         let variance = self.rate_variance;
@@ -145,7 +145,7 @@ impl<V: Falls, const B: usize> Parts<V, B> {
         V::pick(cut, self.cut_off::<X, N>(side, cut), certain)
     }
 
-    /// The same where there is something to `cut` off.
+    /// Restricts the rate in the lanes that need a `cut`.
     #[inline(always)]
     pub(crate) fn cut_off<X: Switch<V>, const N: usize>(&mut self, side: V, cut: V::Mask) -> V {
         let (zero, gone) = (side.nothing(), side.literal(-1.0));
@@ -186,7 +186,7 @@ impl<V: Lanes, const B: usize> Parts<V, B> {
     }
 }
 
-/// What a branch, or the baseline, makes of a move of the rate.
+/// Updates a branch, or the baseline, after a move of the rate.
 #[inline(always)]
 fn follow<V: Lanes, const B: usize>(
     part: &mut Part<V, B>,

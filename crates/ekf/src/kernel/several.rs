@@ -22,7 +22,7 @@ pub(crate) trait Several: Lanes {
     /// The bits of the numbers shifted to the left; `shifted` does it with one of them.
     #[must_use]
     fn bits_shifted(self, by: u32, shifted: impl FnOnce(Self::Number) -> Self::Number) -> Self;
-    /// Where something is true.
+    /// Returns the mask of the lanes for which `truth` holds.
     fn mask(self, truth: impl FnMut(usize) -> bool) -> Self::Mask;
     /// The numbers in a lane.
     fn parts<const B: usize, R>(
@@ -30,7 +30,7 @@ pub(crate) trait Several: Lanes {
         lane: usize,
         see: impl FnOnce(&Parts<Self::Number, B>) -> R,
     ) -> R;
-    /// Whether it is true in a lane.
+    /// True if the mask is set in a lane.
     fn holds(mask: Self::Mask, lane: usize) -> bool;
 }
 
@@ -154,10 +154,10 @@ mod vector {
 
 /// Work that is done with numbers or with vectors of them.
 pub(crate) trait Work<T> {
-    /// What comes of it.
+    /// Result of the work.
     type Said;
 
-    /// Does it with lanes as these.
+    /// Does the work with lanes like these.
     fn with_lanes<V: Several<Number = T>>(self, like: V) -> Self::Said;
 }
 
@@ -166,7 +166,7 @@ pub(crate) trait InVectors: Scalar {
     /// Does work with vectors where the processor has some that are worth it. They round as numbers do: results are the same
     /// to the last bit.
     fn in_vectors<W: Work<Self>>(work: W) -> Option<W::Said>;
-    /// What [`falling`](super::Falls::falling) takes in this precision.
+    /// Constants of [`falling`](super::Falls::falling) in this precision.
     const FALLING: Falling<Self>;
     /// The bits shifted to where an exponent stands.
     #[must_use]

@@ -75,7 +75,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         self.dt_s
     }
 
-    /// Goes on with steps of another length. The length it has costs a comparison; another one as much as a new filter.
+    /// Changes the length of steps. The present length costs a comparison; another one costs as much as a new filter.
     ///
     /// # Errors
     /// If `dt_s` is not a positive number; the filter stays as it was.
@@ -92,7 +92,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         Ok(())
     }
 
-    /// The same for a length that has been looked at, or is refused by its consequences.
+    /// Changes the length of steps without a check, for one that was checked, or is refused by its consequences.
     pub(crate) fn set_length(&mut self, dt_s: T) {
         self.step = StepConstants::new(&self.model, dt_s, RateSpread::<T, S>::clear());
         self.dt_s = dt_s;
@@ -114,8 +114,8 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         }
     }
 
-    /// The same with a gate: a reading whose normalised innovation squared is above `gate` is compared, and not taken. Decided
-    /// before the belief is written, so that a reading turned down costs no second step. χ² with one degree of freedom exceeds
+    /// Steps with a gate: a reading whose normalised innovation squared is above `gate` is compared, and not taken. The gate is applied
+    /// before the belief is written, so that a rejected reading costs no second step. χ² with one degree of freedom exceeds
     /// 10.8 once in a thousand.
     ///
     /// A gate without a way back can lock a filter out; [`Guard`](crate::Guard) has one.
@@ -135,7 +135,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         }
     }
 
-    /// Never inlined: beside a second try a compiler would compute in advance, and store, what both have in common.
+    /// Steps once, never inlined: beside a second try a compiler would compute in advance, and store, the part that both share.
     #[inline(never)]
     fn step_once<const L: usize>(
         &self,
@@ -153,7 +153,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         Ok(residual)
     }
 
-    /// As [`Self::step_once`].
+    /// See [`Self::step_once`].
     #[inline(never)]
     fn gated_once<const L: usize>(
         &self,

@@ -2,12 +2,12 @@ use ohmstrain_model::{Direction, Scalar, SplitRate, UNEXPLAINED, UNEXPLAINED_SHA
 
 use super::Lanes;
 
-/// How [`SparseEkf`](crate::SparseEkf) splits an uncertain rate between stretching and releasing.
+/// Split of an uncertain rate between stretching and releasing, for [`SparseEkf`](crate::SparseEkf).
 pub trait Switch<V: Lanes>: Copy {
     /// A rate of at least that many standard deviations has one direction; nothing is computed for it.
     const CLEAR: f64;
 
-    /// What the splits of one step share.
+    /// Values that the splits of one step share.
     type Width: Copy;
 
     /// Prepares splits of rates with a variance above zero, 1/s².
@@ -50,7 +50,7 @@ impl<T: Scalar> Switch<T> for Logistic {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Compact;
 
-/// Where the density of [`Compact`] ends, 1/s: three deviations.
+/// Half width of the density of [`Compact`], 1/s: three deviations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CompactWidth<V> {
     width: V,
@@ -59,8 +59,8 @@ pub struct CompactWidth<V> {
 }
 
 impl<V: Lanes> CompactWidth<V> {
-    /// Of a variance above zero, 1/s². Rust's core has no stable way to the square root of a microcontroller's
-    /// floating-point unit: who has one there hands it in as `root`, from a [`Switch`] of their own.
+    /// Computes the width for a variance above zero, 1/s². Rust's core has no stable access to the square root of a microcontroller's
+    /// floating-point unit: a [`Switch`] for such a target passes it as `root`.
     #[inline(always)]
     pub fn new(rate_variance: V, root: impl FnOnce(V) -> V) -> Self {
         let square = rate_variance * rate_variance.literal(9.0);
@@ -108,7 +108,7 @@ fn linear<V: Lanes>(x: V, factor: f64, term: f64) -> V {
     x.mul_add(x.literal(factor), x.literal(term))
 }
 
-/// As [`ohmstrain_model::unexplained`].
+/// See [`ohmstrain_model::unexplained`].
 #[inline(always)]
 fn unexplained<V: Lanes>(extends: V, retracts: V, variance: V) -> V {
     let both = extends * extends.literal(4.0) * retracts;

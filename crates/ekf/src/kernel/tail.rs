@@ -20,14 +20,14 @@ pub trait Recordable: Number + Falls {}
 
 impl<T: Real> Recordable for T {}
 
-/// What is above a border: its probability, and the density at the border over it (the hazard, the inverse of Mills' ratio).
+/// Upper tail above a border: its probability, and the density at the border over it (the hazard, the inverse of Mills' ratio).
 pub(crate) struct Tail<T> {
     pub mass: T,
     pub hazard: T,
 }
 
 impl<V: Falls> Tail<V> {
-    /// Of a standard normal above `border`, where it is `wanted`. The mass is off by up to about `border²` roundings.
+    /// Computes the tail of a standard normal above `border`, in the lanes `wanted`. The mass is off by up to about `border²` roundings.
     #[inline(always)]
     pub(crate) fn above(border: V, wanted: V::Mask) -> Self {
         let (half, one, zero) = (border.literal(0.5), border.literal(1.0), border.nothing());
@@ -135,7 +135,7 @@ fn scaled<V: Lanes>(x: V, square: V) -> V {
     if V::none(is_far) { middle } else { V::pick(is_far, far(x, square), middle) }
 }
 
-/// The same beyond 4.
+/// Returns `exp(x²) erfc(x)` beyond 4.
 #[inline(always)]
 fn far<V: Lanes>(x: V, square: V) -> V {
     let c = <V::Number as Scalar>::of;
@@ -160,8 +160,8 @@ fn far<V: Lanes>(x: V, square: V) -> V {
     (x.literal(core::f64::consts::FRAC_2_SQRT_PI) * x.literal(0.5) - less).over(x)
 }
 
-/// By Horner's scheme, the coefficient of the highest power first: numbers of the lanes' own type, which a microcontroller without
-/// double precision need not convert.
+/// Evaluates a polynomial by Horner's scheme, the coefficient of the highest power first. The coefficients are of the lanes' own type,
+/// which a microcontroller without double precision need not convert.
 #[inline(always)]
 fn polynomial<V: Lanes, const N: usize>(coefficients: [V::Number; N], x: V) -> V {
     let mut sum = x.with(coefficients[0]);

@@ -20,7 +20,7 @@ pub(crate) struct Compared<V, const B: usize> {
     pub innovation: V,
 }
 
-/// How the reading depends on the state.
+/// Reading as a function of the state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ReadingLaw<T, G> {
     pub curve: G,
@@ -99,7 +99,7 @@ impl<V: Lanes, const B: usize> Compared<V, B> {
 }
 
 impl<V: Lanes> OfMotion<V> {
-    /// With a dash-pot whose direction is known.
+    /// Adds a dash-pot whose direction is known.
     #[inline(always)]
     fn moving(self, viscosity: V, rate: V) -> Self {
         Self { expected: viscosity.mul_add(rate, self.expected), viscosity, ..self }
@@ -244,7 +244,7 @@ impl<T: Scalar, S, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, 
     }
 }
 
-/// What a reading says of a branch, or of the baseline, whose covariance with it is `own`.
+/// Updates a branch, or the baseline, whose covariance with the reading is `own`.
 #[inline(always)]
 fn take<V: Lanes, const B: usize>(
     part: &mut Part<V, B>,
@@ -263,7 +263,7 @@ fn take<V: Lanes, const B: usize>(
     part.variance = minus_gain.mul_add(own, part.variance);
 }
 
-/// Why a reading was not taken.
+/// Returns the reason for refusing a reading.
 #[cold]
 pub(crate) fn refusal<T: Scalar>(reading: Reading<T>, residual: &Residual<T>) -> StepError {
     let Residual { innovation, variance, .. } = *residual;

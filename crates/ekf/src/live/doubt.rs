@@ -1,4 +1,4 @@
-//! When an interval is wider than the filter says, in any precision.
+//! Doubts that make an interval wider than the filter's own, in any precision.
 
 use super::{Flag, Flags, Innovations, NEVER_READ_S, RestSeen, RestWatch, SURPRISING_NIS, Unread};
 use crate::{Gaussian, Recordable};
@@ -6,23 +6,23 @@ use crate::{Gaussian, Recordable};
 /// The numbers behind the widened intervals, also for programs that write a filter in another language.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DoubtNumbers {
-    /// How long it takes until it has fallen to 37 % that readings were beyond those of the largest strains, s: a body comes there
-    /// from time to time. A third of it is that of the side of rest, and of the mean of normalised innovations squared; a twelfth
-    /// that of the doubt of a start or a fault.
+    /// Time constant, s, with which readings beyond those of the largest strains are forgotten: a body reaches such strains from time to
+    /// time. A third of it applies to readings beyond the side of rest, and to the mean of normalised innovations squared; a twelfth
+    /// to the doubt of a start or a fault.
     pub far_fades_s: f64,
-    /// How many times counts what readings are outside on the side of rest, where a sensor that has not moved for long begins and
-    /// soon has left it.
+    /// Factor on the distance of readings outside the calibrated range on the side of rest. A sensor that has not moved for long starts
+    /// there and soon leaves it.
     pub near_counts: f64,
-    /// The same on the other side, where nothing leads but another R₀, another gain or a strain beyond calibration's: if all readings
-    /// are off, only those at an end of their range show it, and not all of it.
+    /// Factor on the distance of readings outside on the other side, reached only with another R₀, another gain or a strain beyond
+    /// calibration's: if all readings are off, only those at an end of their range show it, and not all of it.
     pub far_counts: f64,
-    /// Share of calibration's range of readings by which they may lie outside for nothing.
+    /// Tolerance of readings outside the calibrated range, as a share of it.
     pub margin: f64,
-    /// How many times the fastest rate of calibration, which is its 99th percentile, is beyond it.
+    /// Factor on the fastest rate of calibration, its 99th percentile, above which a rate is flagged.
     pub faster: f64,
     /// Share of the filter's variance, or of the doubt at a start, from which on a doubt is worth a flag.
     pub worth: f64,
-    /// Share of the span that a strain of none may have.
+    /// Tolerance around zero strain, as a fraction of the span.
     pub zero: f64,
 }
 
@@ -37,7 +37,7 @@ pub const DOUBT: DoubtNumbers = DoubtNumbers {
     zero: 0.01,
 };
 
-/// What the doubts of a sensor depend on: what its calibration has seen.
+/// Calibration values that the doubts of a sensor depend on.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct DoubtParts<T> {
@@ -57,14 +57,14 @@ pub struct DoubtParts<T> {
     pub most: T,
     /// Variance of the strain from what a session leaves open of R₀; zero where calibration knows one session only.
     pub session: T,
-    /// What is known without a reading.
+    /// Bounds on the strain without a reading.
     pub unread: Unread<T>,
-    /// What the sensor read at rest, if that is known.
+    /// Readings of the sensor at rest in calibration, if known.
     pub rest: Option<RestSeen<T>>,
 }
 
 impl DoubtParts<f64> {
-    /// The same in another precision.
+    /// Converts it to another precision.
     #[must_use]
     pub fn to<T: Recordable>(&self) -> DoubtParts<T> {
         DoubtParts {
@@ -82,7 +82,7 @@ impl DoubtParts<f64> {
     }
 }
 
-/// What is left after a row of what was known before it, of three time constants: one exponential.
+/// Factors by which earlier doubts have decayed after a row, for three time constants; computed from one exponential.
 struct Left<T> {
     /// 60 s.
     far: T,
@@ -101,11 +101,11 @@ impl<T: Recordable> Left<T> {
     }
 }
 
-/// How ill the sensor's law has fitted lately.
+/// Recent misfit of the sensor's law.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Misfit<T> {
-    /// How far readings have been outside of calibration's on the side of rest, and on the other one, R/R₀ - 1, fading.
+    /// Distance of readings outside the calibrated range on the side of rest, and on the other side, R/R₀ - 1; it decays with time.
     pub(crate) near: T,
     pub(crate) far: T,
     pub(crate) innovations: Innovations<T>,
@@ -136,8 +136,8 @@ impl<T: Recordable> Misfit<T> {
     }
 }
 
-/// What no filter knows by itself: that it has only just begun, or begun again; that readings have jumped; that the sensor is
-/// used outside of what its calibration has seen, or that its law does not fit. It widens the strain's interval, and says why.
+/// Doubts that a filter does not have by itself: that it has just started, or restarted; that readings have jumped; that the sensor is
+/// used outside its calibrated range, or that its law does not fit. They widen the strain's interval and raise flags with the reason.
 ///
 /// ```
 /// use ohmstrain_ekf::Gaussian;
@@ -179,14 +179,14 @@ pub struct Doubts<T> {
     /// The last reading that was believed, R/R₀ - 1.
     pub(crate) believed: Option<T>,
     pub(crate) misfit: Misfit<T>,
-    /// Whether the strain's variance knows of innovations that are larger than stated.
+    /// True if the strain's variance already includes innovations that are larger than stated.
     corrected: bool,
-    /// Whether R₀ is calibration's; none where that one does not know what the sensor reads at rest.
+    /// Watch for another R₀ than calibration's; `None` if calibration does not know the rested sensor's reading.
     pub(crate) rest: Option<RestWatch<T>>,
 }
 
 impl<T: Recordable> Doubts<T> {
-    /// Before the first row.
+    /// Starts before the first row.
     #[must_use]
     pub fn new(parts: DoubtParts<T>) -> Self {
         Self {
@@ -204,20 +204,20 @@ impl<T: Recordable> Doubts<T> {
         }
     }
 
-    /// The same where the strain is known at the start, and whether it is none.
+    /// States that the strain is known at the start; `rests` if it is zero.
     #[must_use]
     pub fn of_known_strain(self, rests: bool) -> Self {
         let rest = self.parts.rest.map(|seen| RestWatch::new(seen, rests));
         Self { starts: false, fading: T::zero(), unread_s: T::zero(), rest, ..self }
     }
 
-    /// The same for a filter whose correction counts how large innovations have been.
+    /// States that the filter's correction includes the size of innovations.
     #[must_use]
     pub fn of_corrected(self) -> Self {
         Self { corrected: true, ..self }
     }
 
-    /// How much larger innovations have been than stated, for the correction of the next row.
+    /// Returns the factor by which innovations have been larger than stated, for the correction of the next row.
     pub fn birge(&self) -> T {
         self.misfit.innovations.birge()
     }
@@ -227,12 +227,12 @@ impl<T: Recordable> Doubts<T> {
         (self.fading, self.starts, self.unread_s, self.refused) = (T::zero(), false, T::zero(), false);
     }
 
-    /// R₀ of today has been told.
+    /// Restarts the watch: R₀ of the day is now given.
     pub fn told_rest(&mut self) {
         self.rest.iter_mut().for_each(RestWatch::told);
     }
 
-    /// There is more to doubt than what is left of a start.
+    /// Raises the fading variance if this doubt exceeds what is left of a start.
     fn raise(&mut self, variance: T) {
         let variance = variance.min(self.parts.most);
         if variance > self.fading {
@@ -240,7 +240,7 @@ impl<T: Recordable> Doubts<T> {
         }
     }
 
-    /// What is known without readings, and for how long there have been none, s.
+    /// Returns the bounds on the strain without readings, and the time since the last reading, s.
     pub const fn unread(&self) -> (Unread<T>, T)
     where
         T: Copy,
@@ -257,7 +257,7 @@ impl<T: Recordable> Doubts<T> {
         stated.variance
     }
 
-    /// Whether there has been a reading that was used, or a strain that was known.
+    /// True once a reading was used or the strain was known.
     pub fn has_begun(&self) -> bool {
         self.unread_s < T::of(NEVER_READ_S)
     }
@@ -322,7 +322,7 @@ impl<T: Recordable> Doubts<T> {
         }
     }
 
-    /// What a reading says of the law and of R₀.
+    /// Updates the doubts of the law and of R₀ with a reading.
     fn judge(&mut self, left: &Left<T>, passed_s: T, rho: T, nis: T) {
         self.misfit.see(&self.parts, left, rho, nis);
         self.rest.iter_mut().for_each(|rest| {
@@ -330,10 +330,10 @@ impl<T: Recordable> Doubts<T> {
         });
     }
 
-    /// The strain's variance with all doubts, and flags that say so. Readings outside of calibration's are off in strain by some
-    /// multiple of what the mean slope says. Innovations that are larger than stated widen the interval as they would a weighted mean's (Birge,
-    /// *Phys. Rev.* 40 (1932) 207), unless a correction has counted them, and so does a rate beyond calibration's; to no more than is left open
-    /// without readings.
+    /// Returns the strain's variance with all doubts, and their flags. Readings outside the calibrated range widen it by a
+    /// multiple of their distance times the mean slope. Innovations that are larger than stated widen the interval as they would a weighted
+    /// mean's (Birge, *Phys. Rev.* 40 (1932) 207), unless a correction has counted them. So does a rate beyond calibration's. The variance
+    /// stays below that without readings.
     pub fn widened(&self, rate: T, variance: T) -> (T, Flags) {
         let (worth, most, per_reading) = (T::of(DOUBT.worth), self.parts.most, self.parts.per_reading);
         let faster = rate.abs() / self.parts.fastest_per_s;
@@ -372,7 +372,7 @@ mod tests {
 
     const STATED: Gaussian<f64> = Gaussian { mean: 0.1, variance: 1e-6 };
 
-    /// Readings of 0 to 1 for strains of 0 to 0.3, and a rest at the end that `sign` says.
+    /// Returns doubts for readings of 0 to 1 and strains of 0 to 0.3, with rest at the end given by `sign`.
     fn parts(sign: f64) -> DoubtParts<f64> {
         let anywhere = 0.3 * 0.3 / 12.0;
         let unread = Unread { rate_time_s: 1.0, path_variance: 1e-3, centre: 0.15, anywhere };
@@ -393,7 +393,7 @@ mod tests {
         }
     }
 
-    /// What is said after rows every 0.1 s, of readings with normalised innovations squared.
+    /// Returns the variance and flags after rows every 0.1 s, of readings with normalised innovations squared.
     fn said(parts: DoubtParts<f64>, rows: impl IntoIterator<Item = (f64, f64)>) -> (f64, Flags) {
         let mut doubts = Doubts::new(parts).of_known_strain(false);
         rows.into_iter().for_each(|row| {

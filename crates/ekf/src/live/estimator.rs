@@ -13,7 +13,7 @@ pub trait SensorEstimator<T: Real, const N: usize, const L: usize>: Estimator<T,
     fn start(&self, strain: Option<Gaussian<T>>) -> Self::State;
 }
 
-/// What a model begins with.
+/// Returns the initial belief of a model.
 fn belief<T: Real, const B: usize, const N: usize, const L: usize>(
     model: &SwitchedModel<T, B, N>,
     strain: Option<Gaussian<T>>,

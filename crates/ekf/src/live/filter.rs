@@ -12,7 +12,7 @@ use crate::{
     Substeps,
 };
 
-/// How far beyond the limits a strain may be that somebody knows, in spans.
+/// Tolerance beyond the limits for a known strain, in spans.
 ///
 /// ```
 /// // Of a sensor of 0 to 30 % one may know 33 %.
@@ -36,7 +36,7 @@ pub struct LiveEstimate<T> {
     pub strain: Gaussian<T>,
     /// Its rate, 1/s.
     pub rate: Gaussian<T>,
-    /// What became of the reading, and what is to be doubted.
+    /// Flags: the verdict on the reading, and the doubts.
     pub flags: Flags,
 }
 
@@ -71,7 +71,7 @@ pub struct Heard<T> {
     pub used: Option<Reading<T>>,
     /// Normalised innovation squared of the reading as it came; `None` if it was not compared.
     pub nis: Option<T>,
-    /// How far readings have jumped, where the filter has looked again: at the second in a row that startles
+    /// Jump of the readings, if the filter has looked again: at the second in a row that startles
     /// (by five standard deviations), [`Sieve::jump`] away from the last that did not surprise.
     pub jumped: Option<T>,
     /// Factor on the covariance of the state before the step, at a readmission ([`Guard`]).
@@ -79,7 +79,7 @@ pub struct Heard<T> {
 }
 
 impl<T: Real> Heard<T> {
-    /// There was no reading.
+    /// Returns the value for a missing reading.
     #[must_use]
     pub fn nothing() -> Self {
         let verdict = ReadingVerdict::Missing;
@@ -101,11 +101,11 @@ pub struct LiveFilter<T: Real, E: SensorEstimator<T, N, L>, C, const N: usize, c
     guard: Guard<T>,
     parts: LiveParts<T, C>,
     protections: Protections,
-    /// What a reading must be, under them.
+    /// Plausibility limits on a reading, under these protections.
     sieve: Sieve<T>,
-    /// R₀ of the law as it has been told.
+    /// R₀ of the law, moved by the measured reading at rest if one was given.
     rest_reading: T,
-    /// Before any reading.
+    /// State before any reading.
     fresh: E::State,
     /// The way over a pause, prepared.
     prepared: (Pause<T>, Repeated<E::Prepared, T>),
@@ -116,18 +116,18 @@ pub struct LiveFilter<T: Real, E: SensorEstimator<T, N, L>, C, const N: usize, c
 #[derive(Clone, Copy)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Memory<T, S> {
-    /// At the last reading that was used, or whole steps of a pause after it; and the time since then.
+    /// State at the last reading that was used, or after whole steps of a pause after it; and the time since then.
     state: S,
     pause: Pause<T>,
     streak: Streak,
     repeats: Repeats<T>,
     jumps: Jumps<T>,
-    /// What the correction sees of readings, if there is one.
+    /// Features that the correction computes from readings, if there is a correction.
     watched: Option<ReadingFeatures<T>>,
     /// The filter's variance at the last reading that it saw.
     known_variance: T,
     doubts: Doubts<T>,
-    /// `None` where R₀ is told, or does not follow.
+    /// Follower of R₀; `None` if R₀ is given, or does not follow.
     follower: Option<RestFollower<T>>,
 }
 
@@ -137,7 +137,7 @@ where
     E: SensorEstimator<T, N, L>,
     C: Correct<T>,
 {
-    /// Before any reading.
+    /// Creates a filter before any reading.
     #[must_use]
     pub fn new(estimator: E, parts: LiveParts<T, C>) -> Self {
         let fresh = estimator.start(None);
@@ -157,14 +157,14 @@ where
         }
     }
 
-    /// The same before any reading, with some protections turned off.
+    /// Turns off some protections, before any reading.
     #[must_use]
     pub fn protected_by(self, protections: Protections) -> Self {
         let now = Memory::new(&self.parts, protections, (self.fresh.clone(), at_reading(&self.estimator, &self.parts)));
         Self { guard: guard(protections), protections, sieve: self.parts.sieve.under(protections), now, ..self }
     }
 
-    /// The same with another guard against outliers.
+    /// Sets another guard against outliers.
     #[must_use]
     pub fn guarded_by(self, guard: Guard<T>) -> Self {
         Self { guard, ..self }
@@ -190,7 +190,7 @@ where
         self.now.clone()
     }
 
-    /// Goes on from where this filter was.
+    /// Returns the filter to a remembered state.
     pub fn return_to(&mut self, memory: &Memory<T, E::State>) {
         self.now = memory.clone();
     }
@@ -205,7 +205,7 @@ where
         &self.now.doubts
     }
 
-    /// R₀ as it is followed, minus the one that was calibrated or told, as a share of that.
+    /// Relative deviation of the followed R₀ from the calibrated or given one.
     pub fn rest_off(&self) -> T {
         self.now.follower.map_or(T::zero(), |follower| follower.off())
     }
@@ -231,14 +231,14 @@ where
         self.step_after(self.parts.dt_s, None)
     }
 
-    /// A reading in the unit of the calibration, with the standard deviation that its electronics add, as R/R₀ - 1 of the R₀ that
-    /// was calibrated, or told since.
+    /// Converts a reading in the unit of the calibration, with the standard deviation that its electronics add, to R/R₀ - 1 of the R₀ that
+    /// was calibrated, or given since.
     pub fn relative(&self, reading: T, reading_sd: T) -> Reading<T> {
         let sd = reading_sd / self.rest_reading;
         Reading { value: (reading - self.rest_reading) / self.rest_reading, extra_variance: sd * sd }
     }
 
-    /// What the rested, unstretched sensor is found to read from now on.
+    /// Sets the measured reading of the rested, unstretched sensor, from now on.
     ///
     /// # Errors
     /// If it is not a positive number, or not within a factor of [`FARTHEST_REST`] of what it read in calibration.
@@ -292,7 +292,7 @@ where
         self.row_after(dt_s, reading).map(|row| row.estimate)
     }
 
-    /// The same, with all that a row says.
+    /// Takes a row, and returns all of its results.
     ///
     /// # Errors
     /// As [`Self::step_after`].
@@ -393,7 +393,7 @@ where
         }
     }
 
-    /// Lets the correction see a reading that the filter has used.
+    /// Passes a reading that the filter has used to the correction.
     fn watch(&mut self, dt_s: T, heard: &Heard<T>, filtered: Gaussian<T>) {
         if let Some(watched) = &mut self.now.watched {
             watched.step_unless(heard.surprises(), dt_s, heard.used.map(|used| used.value));
@@ -467,7 +467,7 @@ pub fn reported<T: Recordable>(strain: Gaussian<T>, sd_scale: T, limits: &Strain
     Gaussian { mean: strain.mean, variance }.clamped(limits)
 }
 
-/// Whether the strain may be zero: within the limits, or a little beyond.
+/// True if the strain may be zero: within the limits, or a little beyond.
 #[must_use]
 pub fn may_be_unstretched<T: Real>(limits: &StrainRange<T>) -> bool {
     limits.lower.max(-limits.upper) <= T::of(KNOWN_BEYOND) * limits.span()

@@ -2,7 +2,7 @@ use core::fmt;
 
 use crate::ReadingVerdict;
 
-/// What there is to say about an estimate beside its numbers.
+/// Flags of an estimate: all that is reported about it besides its numbers.
 ///
 /// ```
 /// use ohmstrain_ekf::live::{Flag, Flags};
@@ -22,7 +22,7 @@ pub struct Flags(u16);
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Flag {
-    /// There was no reading.
+    /// Missing reading.
     Missing,
     /// The converter stood at an end of its scale.
     Saturated,
@@ -36,17 +36,17 @@ pub enum Flag {
     Stuck,
     /// Taken though beyond the gate, because too many in a row were turned down.
     Readmitted,
-    /// At the present speed the reading stops telling the strain near here.
+    /// Ramp border nearby: at the present speed the reading hardly depends on the strain.
     RampBorder,
     /// The strain stands at a limit.
     AtLimit,
-    /// The filter has only just begun, where nobody said at which strain.
+    /// The filter has only just begun, at an unknown strain.
     StartUp,
     /// Readings have jumped, or come again after there were none to be believed: the estimate finds its way back.
     Recovering,
     /// Readings are, or have been, outside of calibration's, or the strain changes much faster.
     Extrapolated,
-    /// It has been running for longer than any recording of the calibration.
+    /// Run longer than any recording of the calibration.
     LongRun,
     /// The sensor does not rest where it rested in calibration: R₀ is another one.
     RestMoved,
@@ -102,14 +102,14 @@ impl Flag {
 }
 
 impl Flags {
-    /// Nothing to say.
+    /// No flags.
     ///
     /// ```
     /// assert_eq!(ohmstrain_ekf::live::Flags::NONE.to_string(), "");
     /// ```
     pub const NONE: Self = Self(0);
 
-    /// What became of a reading.
+    /// Returns the flags of a verdict on a reading.
     ///
     /// ```
     /// use ohmstrain_ekf::{ReadingVerdict, live::Flags};
@@ -130,7 +130,7 @@ impl Flags {
         }
     }
 
-    /// With one more raised, if `raised`.
+    /// Adds a flag if `raised`.
     ///
     /// ```
     /// use ohmstrain_ekf::live::{Flag, Flags};
@@ -142,7 +142,7 @@ impl Flags {
         Self(self.0 | (raised as u16) << flag as u16)
     }
 
-    /// Those of either.
+    /// Returns the flags raised in either.
     ///
     /// ```
     /// use ohmstrain_ekf::live::{Flag, Flags};
@@ -155,7 +155,7 @@ impl Flags {
         Self(self.0 | others.0)
     }
 
-    /// Whether one is raised.
+    /// True if the flag is raised.
     ///
     /// ```
     /// use ohmstrain_ekf::live::{Flag, Flags};
@@ -179,7 +179,7 @@ impl Flags {
     }
 }
 
-/// As in `estimates.csv`: names joined by `|`.
+/// Names joined by `|`, as in `estimates.csv`.
 impl fmt::Display for Flags {
     fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
         for (k, name) in self.names().enumerate() {

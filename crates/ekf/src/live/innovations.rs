@@ -1,6 +1,6 @@
 use crate::Recordable;
 
-/// How much larger a filter's innovations have been of late than it states them: the mean of their normalised squares.
+/// Recent size of a filter's innovations against the stated one: the mean of their normalised squares.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Innovations<T> {
@@ -8,10 +8,10 @@ pub struct Innovations<T> {
 }
 
 impl<T: Recordable> Innovations<T> {
-    /// As much as a normalised innovation squared counts: one alone is an outlier, not a law that does not fit.
+    /// Cap on a normalised innovation squared: a single outlier is not a law that does not fit.
     pub const MOST: f64 = 30.0;
 
-    /// Before any.
+    /// Starts before any innovation.
     #[must_use]
     pub fn none() -> Self {
         Self { mean: T::zero() }
@@ -22,7 +22,7 @@ impl<T: Recordable> Innovations<T> {
         self.mean += (T::one() - left) * (nis.min(T::of(Self::MOST)) - self.mean);
     }
 
-    /// By how much what the filter states is multiplied, as of a weighted mean (Birge, *Phys. Rev.* 40 (1932) 207); never less than
+    /// Returns the factor on the filter's variance, as of a weighted mean (Birge, *Phys. Rev.* 40 (1932) 207); never less than
     /// one.
     #[must_use]
     pub fn birge(&self) -> T {

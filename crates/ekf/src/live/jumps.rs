@@ -4,12 +4,12 @@ use crate::Recordable;
 pub const SURPRISING_NIS: f64 = 9.0;
 /// Normalised innovation squared above which a reading startles: five standard deviations.
 const STARTLING_NIS: f64 = 25.0;
-/// After so many startling readings in a row a filter looks again.
+/// Number of startling readings in a row after which a filter looks again.
 const BESIDE_AFTER: f64 = 2.0;
-/// How much of the weight then has what it knew before any reading.
+/// Weight that the knowledge from before any reading then gets.
 pub const BESIDE_SHARE: f64 = 0.1;
 
-/// Whether readings have jumped, so that a filter is to look again. A law that is wrong, on another day say, surprises without a
+/// Detector of jumps in the readings, after which a filter looks again. A wrong law, on another day for example, surprises without a
 /// jump: a filter that looked again then would lose what it has learned since.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -21,7 +21,7 @@ pub struct Jumps<T> {
 }
 
 impl<T: Recordable> Jumps<T> {
-    /// Before any reading.
+    /// Starts before any reading.
     #[must_use]
     pub fn none() -> Self {
         Self { startling: T::zero(), calm: None }
@@ -41,7 +41,7 @@ impl<T: Recordable> Jumps<T> {
 mod tests {
     use super::Jumps;
 
-    /// What `readings` with their normalised innovations squared say, one by one.
+    /// Feeds `readings` with their normalised innovations squared, and returns the jump after each.
     fn seen(readings: &[(f64, f64)]) -> Vec<Option<f64>> {
         let mut jumps = Jumps::none();
         readings.iter().map(|&(reading, nis)| jumps.see(reading, nis, 0.08)).collect()

@@ -1,12 +1,12 @@
 use crate::correction::{Correction, FILTER_INPUTS, OUTPUTS, Quadratic};
 use crate::{Gaussian, Real};
 
-/// What corrects a filter's strain: a correction, and what stands for training rows that a small chip has no room for.
+/// Correction of a filter's strain, with a substitute for training rows that a small chip has no room for.
 #[derive(Clone, Copy, Debug)]
 pub struct Learned<'a, T> {
     /// The rows that are left.
     pub correction: Correction<'a, T, FILTER_INPUTS>,
-    /// What is added to the means of the direct process and of the residual one.
+    /// Quadratics added to the means of the direct process and of the residual one.
     pub quadratics: Option<[Quadratic<'a, T>; 2]>,
 }
 

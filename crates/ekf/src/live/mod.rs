@@ -1,6 +1,6 @@
-//! A sensor's filter as it runs for days on a machine: what a reading must be for it, what is made of those that surprise or
-//! jump, R₀ of the day, the learned correction, and when its intervals are wider than it says. In any precision, so that what a
-//! computer runs is what a chip runs.
+//! A sensor's filter as it runs for days on a machine: plausibility of readings, surprising readings and jumps, R₀ of the day, the
+//! learned correction, and doubts that widen its intervals. It is generic over the precision, so that a computer and a chip run the
+//! same.
 
 mod doubt;
 mod estimator;

@@ -4,12 +4,12 @@ use super::{DoubtParts, RestBounds, Sieve};
 use crate::Recordable;
 use crate::correction::FeatureScale;
 
-/// Surroundings of the estimator in a [`LiveFilter`](super::LiveFilter): all that a calibration says of the sensor.
+/// Surroundings of the estimator in a [`LiveFilter`](super::LiveFilter): all of a sensor's calibration.
 #[derive(Clone, Copy, Debug)]
 pub struct LiveParts<T, C> {
     /// R₀ of the law, in the unit of the readings.
     pub rest_reading: T,
-    /// What the rested, unstretched sensor read in calibration: of the day, where R₀ is of the law.
+    /// Reading of the rested, unstretched sensor in calibration, as measured that day; R₀ is fitted with the law.
     pub rested: T,
     /// Usual time between readings, s.
     pub dt_s: T,
@@ -23,9 +23,9 @@ pub struct LiveParts<T, C> {
     pub reading_variance: T,
     /// Variance of a strain that is known at a start.
     pub known_variance: T,
-    /// What a reading must be.
+    /// Plausibility limits on a reading.
     pub sieve: Sieve<T>,
-    /// When the interval is wider than the filter says.
+    /// Parts of the doubts that widen the interval.
     pub doubt: DoubtParts<T>,
     /// Between which readings R₀ stays.
     pub rest: RestBounds<T>,
@@ -34,7 +34,7 @@ pub struct LiveParts<T, C> {
 }
 
 impl<T, C> LiveParts<T, C> {
-    /// The same with a correction, or without.
+    /// Sets the correction, or none.
     #[must_use]
     pub fn with_correction<D>(self, learned: Option<(FeatureScale<T>, D)>) -> LiveParts<T, D> {
         let Self { rest_reading, rested, dt_s, longest_step_s, limits, strain_sd_scale, .. } = self;
@@ -57,7 +57,7 @@ impl<T, C> LiveParts<T, C> {
 }
 
 impl<C> LiveParts<f64, C> {
-    /// The same in another precision, without a correction.
+    /// Converts it to another precision, without a correction.
     #[must_use]
     pub fn to<T: Recordable>(&self) -> LiveParts<T, ()> {
         LiveParts {

@@ -1,23 +1,23 @@
-/// What protects a filter from what no calibration has seen. All of it is on unless somebody turns it off.
+/// Protections of a filter against conditions that no calibration has seen. All of them are on by default.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Protections {
-    /// Readings that this sensor cannot give, and numbers that come again and again, are none.
+    /// Plausibility check: readings that this sensor cannot give, and numbers that repeat too often, count as missing.
     pub plausibility: bool,
-    /// A reading beyond three standard deviations counts the less the farther it is.
+    /// Bounded influence: a reading beyond three standard deviations counts the less the farther it is.
     pub influence: bool,
-    /// Where readings jump, what was known before any reading is followed, too; not without `influence`.
+    /// Second look after a jump of the readings, which also follows the knowledge from before any reading; not without `influence`.
     pub second_look: bool,
-    /// R₀ follows readings that stay beyond those of the calibration.
+    /// Following: R₀ adapts to readings that stay beyond those of the calibration.
     pub following: bool,
-    /// Intervals are wider at a start, after a fault, and outside of the calibration.
+    /// Doubts: intervals are wider at a start, after a fault, and outside the calibrated range.
     pub doubts: bool,
 }
 
 impl Protections {
-    /// Everything is off.
+    /// All protections off.
     pub const NONE: Self =
         Self { plausibility: false, influence: false, second_look: false, following: false, doubts: false };
-    /// Everything is on.
+    /// All protections on.
     pub const ALL: Self =
         Self { plausibility: true, influence: true, second_look: true, following: true, doubts: true };
 }

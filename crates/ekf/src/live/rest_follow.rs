@@ -6,7 +6,7 @@ use crate::{Reading, Recordable};
 struct Following {
     /// Time constant with which R₀ leaves calibration's for where the readings want it, s.
     leaves_s: f64,
-    /// The same, where a whole recording is gone through for the one R₀ of all its rows.
+    /// Time constant where a whole recording is processed for the one R₀ of all its rows, s.
     settles_s: f64,
     /// Time constant with which it comes back, s.
     returns_s: f64,
@@ -14,7 +14,7 @@ struct Following {
     longest_s: f64,
     /// Readings that jump back within so long, s, were a fault in between, and not another day.
     fault_s: f64,
-    /// By what factor a reading may want R₀ to be another: beyond it, it is no reading of this sensor.
+    /// Largest factor between another R₀ and calibration's; a reading that would need more is not of this sensor.
     farthest: f64,
 }
 
@@ -23,7 +23,7 @@ struct Following {
 const FOLLOWING: Following =
     Following { leaves_s: 40.0, settles_s: 10.0, returns_s: 1.0, longest_s: 2.0, fault_s: 30.0, farthest: 2.0 };
 
-/// Largest factor between R₀ as somebody gives it and what the rested sensor read in calibration, either way. Beyond it, it is in
+/// Largest factor between a given R₀ and the rested sensor's reading in calibration, either way. Beyond it, the given R₀ is in
 /// another unit, or of another sensor.
 ///
 /// ```
@@ -35,7 +35,7 @@ pub const FARTHEST_REST: f64 = 4.0;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RestBounds<T> {
-    /// The least; none where nobody knows.
+    /// The least; `None` if unknown.
     pub low: Option<T>,
     /// The largest.
     pub high: Option<T>,
@@ -45,7 +45,7 @@ pub struct RestBounds<T> {
 
 /// Estimate of R₀ from the first reading of a session, by the differences between recordings of the calibration.
 ///
-/// R₀ is drawn anew for each session: `ln R₀` has the standard deviation s between sessions. A session begins at rest, with a
+/// R₀ differs from session to session: `ln R₀` has the standard deviation s between sessions. A session begins at rest, with a
 /// reading whose logarithm is `ln R₀` plus a constant, to the standard deviation f. The best linear estimate of `ln R₀` from the first
 /// reading is `s²/(s² + f²)` of the way from calibration's R₀ to the one that the reading alone suggests.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,7 +58,7 @@ pub struct SessionStart<T> {
 }
 
 impl RestBounds<f64> {
-    /// The same in another precision.
+    /// Converts it to another precision.
     #[must_use]
     pub fn to<T: Recordable>(&self) -> RestBounds<T> {
         RestBounds {
@@ -69,11 +69,11 @@ impl RestBounds<f64> {
     }
 }
 
-/// R₀ that follows the readings: it is calibration's as long as they stay where they were then; one that lies beyond them
-/// slowly draws it after itself, and one beyond the other end soon draws it back (a play as wide as calibration's readings,
-/// with a lag). Where sessions are known to begin at rest, it begins at what the first reading says ([`SessionStart`]), and that
-/// stands for calibration's. Following is right where the sensor moves between the same strains as in calibration, on another day. Where it is stretched
-/// farther, the strain is at its limit in any case.
+/// R₀ that follows the readings. It is calibration's as long as they stay in the calibrated range; a reading beyond the range
+/// slowly draws it along, and one beyond the other end soon draws it back (a play as wide as calibration's readings,
+/// with a lag). Where sessions are known to begin at rest, it starts at the value that the first reading suggests ([`SessionStart`]), which
+/// replaces calibration's. Following is right where the sensor moves between the same strains as in calibration, on another day. Where
+/// it is stretched farther, the strain is at its limit in any case.
 ///
 /// ```
 /// use ohmstrain_ekf::live::{RestBounds, RestFollower};
@@ -90,21 +90,21 @@ impl RestBounds<f64> {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RestFollower<T> {
     bounds: RestBounds<T>,
-    /// By what share of calibration's R₀ it is another.
+    /// Relative deviation of R₀ from calibration's.
     pub(crate) off: T,
-    /// The same when the session began.
+    /// Relative deviation of R₀ when the session began.
     pub(crate) home: T,
     /// True once R₀ of the session has its start.
     pub(crate) has_begun: bool,
     /// The last reading, none before the first one, and the time since it came, s.
     pub(crate) last: Option<T>,
     pub(crate) since_s: T,
-    /// What `off` was where readings last jumped, and how long ago that was, s, in rows that were read.
+    /// Value of `off` when readings last jumped, and the time since, s, in rows that were read.
     pub(crate) jumped: Option<[T; 2]>,
 }
 
 impl<T: Recordable> RestFollower<T> {
-    /// Before any reading, R₀ is calibration's.
+    /// Starts before any reading, with calibration's R₀.
     ///
     /// ```
     /// let bounds = ohmstrain_ekf::live::RestBounds { low: None, high: Some(1.5), start: None };
@@ -115,7 +115,7 @@ impl<T: Recordable> RestFollower<T> {
         Self { bounds, off: T::zero(), home: T::zero(), has_begun: false, last: None, since_s: T::zero(), jumped: None }
     }
 
-    /// The same for a session that begins stretched: its first reading tells nothing of R₀.
+    /// Starts a session that begins stretched: its first reading carries no information on R₀.
     ///
     /// ```
     /// let start = Some(ohmstrain_ekf::live::SessionStart { reading: 0.0, weight: 0.5 });
@@ -129,7 +129,7 @@ impl<T: Recordable> RestFollower<T> {
         Self { has_begun: true, ..self }
     }
 
-    /// By what share of calibration's R₀ it is another.
+    /// Returns the relative deviation of R₀ from calibration's.
     ///
     /// ```
     /// let mut follower = ohmstrain_ekf::live::RestFollower::<f64>::new(ohmstrain_ekf::live::RestBounds { low: None, high: None, start: None });
@@ -177,8 +177,8 @@ impl<T: Recordable> RestFollower<T> {
         off.max(T::of(1.0 / FOLLOWING.farthest - 1.0)).min(T::of(FOLLOWING.farthest - 1.0))
     }
 
-    /// Takes a reading R/R₀ - 1, of calibration's R₀, `dt_s` seconds after the reading before. A number that comes again says
-    /// nothing until another one comes: it may be stuck.
+    /// Takes a reading R/R₀ - 1, of calibration's R₀, `dt_s` seconds after the reading before. A repeated number counts
+    /// only when another one comes: it may be stuck.
     ///
     /// ```
     /// let bounds = ohmstrain_ekf::live::RestBounds { low: None, high: Some(1.5), start: None };

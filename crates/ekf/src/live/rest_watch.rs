@@ -1,16 +1,16 @@
-//! Whether the sensor still rests where it rested in calibration.
+//! Watch that the sensor still rests where it rested in calibration.
 
 use crate::Recordable;
 
-/// What calibration has seen of the sensor at rest, as R/R₀ - 1: for programs that write a filter in another language.
+/// Readings of the sensor at rest in calibration, as R/R₀ - 1: for programs that write a filter in another language.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RestSeen<T> {
-    /// What the rested, unstretched sensor read.
+    /// Reading of the rested, unstretched sensor.
     pub rested: T,
-    /// How far from there it may read at rest.
+    /// Tolerance of readings at rest around it.
     pub tolerance: T,
-    /// For how long readings must stay where they are to say something, s.
+    /// Time for which readings must stay in place to count, s.
     pub lasts_s: T,
     /// 1 where readings grow from rest on, -1 where they fall, 0 where rest is in their midst.
     pub sign: T,
@@ -19,7 +19,7 @@ pub struct RestSeen<T> {
 }
 
 impl RestSeen<f64> {
-    /// The same in another precision.
+    /// Converts it to another precision.
     #[must_use]
     pub fn to<T: Recordable>(&self) -> RestSeen<T> {
         RestSeen {
@@ -32,26 +32,26 @@ impl RestSeen<f64> {
     }
 }
 
-/// Watches readings for an R₀ that is not calibration's. Two things say so: a sensor that is known to rest and reads something
-/// else, and readings that stay where no strain leads, beyond those at rest. An R₀ that has grown is not told from a strain that
+/// Watch for an R₀ that is not calibration's. There are two signs: a sensor that is known to rest and reads something
+/// else, and readings that stay where no strain leads, beyond those at rest. An R₀ that has grown cannot be told from a strain that
 /// is held. A sensor that rests for a while where it rested in calibration ends it.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RestWatch<T> {
     seen: RestSeen<T>,
-    /// Whether the next reading is one at rest.
+    /// True if the next reading is one at rest.
     pub(crate) rests: bool,
-    /// For how long readings have been beyond those at rest, and near them, s.
+    /// Time for which readings have been beyond those at rest, and near them, s.
     pub(crate) beyond_s: T,
     pub(crate) near_s: T,
-    /// How far they have been beyond all that time.
+    /// Smallest distance beyond those at rest over that time.
     pub(crate) least: T,
-    /// How far R₀ is off, as a share of it.
+    /// Relative deviation of R₀ from calibration's.
     pub(crate) off: T,
 }
 
 impl<T: Recordable> RestWatch<T> {
-    /// Before any reading; `rests` if the sensor is known to rest then.
+    /// Starts before any reading; `rests` if the sensor is known to rest then.
     ///
     /// ```
     /// use ohmstrain_ekf::live::{RestSeen, RestWatch};
@@ -101,7 +101,7 @@ impl<T: Recordable> RestWatch<T> {
         self.off
     }
 
-    /// R₀ of today has been told: what spoke against calibration's is gone.
+    /// Restarts the watch, since R₀ of the day is given.
     ///
     /// ```
     /// use ohmstrain_ekf::live::{RestSeen, RestWatch};
@@ -116,7 +116,7 @@ impl<T: Recordable> RestWatch<T> {
         *self = Self::new(self.seen, self.rests);
     }
 
-    /// How far R₀ is off, as a share of it; 0 where nothing speaks against it.
+    /// Returns the relative deviation of R₀; 0 if there is no evidence of one.
     ///
     /// ```
     /// use ohmstrain_ekf::live::{RestSeen, RestWatch};

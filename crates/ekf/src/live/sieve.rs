@@ -1,26 +1,26 @@
 use super::Protections;
 use crate::{Reading, ReadingVerdict, Recordable};
 
-/// What a reading must be for a filter to see it at all, and what is made of one that comes again and again.
+/// Plausibility check of readings before the filter uses them, and the rule for a number that repeats.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sieve<T> {
     /// Least and largest R/R₀ - 1 that can be a reading of this sensor.
     pub plausible: (T, T),
     /// Longest time, s, for which a working sensor repeats one number; infinite if that is not known.
     pub longest_repeat_s: T,
-    /// How often a number must have come again to be stuck, [`MOST_REPEATS`] or more.
+    /// Number of repeats from which on a number is stuck, [`MOST_REPEATS`] or more.
     pub most_repeats: T,
     /// Largest variance of a reading's own error, (R/R₀)², at which equal numbers are a fault: a coarser converter gives one code
     /// for as long as the sensor is still.
     pub fine_variance: T,
-    /// How far a reading is from another one, R/R₀ - 1, where it has jumped.
+    /// Distance between two readings, R/R₀ - 1, from which on it is a jump.
     pub jump: T,
     /// Time, s, over which errors of the readings are alike.
     pub error_time_s: T,
 }
 
 impl Sieve<f64> {
-    /// The same in another precision.
+    /// Converts it to another precision.
     #[must_use]
     pub fn to<T: Recordable>(&self) -> Sieve<T> {
         Sieve {
@@ -34,13 +34,13 @@ impl Sieve<f64> {
     }
 }
 
-/// How often a number must have come again to be stuck, where readings are fine.
+/// Number of repeats from which on a number is stuck, for readings with fine resolution.
 pub const MOST_REPEATS: u32 = 10;
-/// The same where the step of the readings is as coarse as their noise allows: a still sensor gives one code as often.
+/// Number of repeats for readings whose step is as coarse as their noise allows: a still sensor gives one code as often.
 pub const MOST_CODE_REPEATS: u32 = 300;
 
 impl<T: Recordable> Sieve<T> {
-    /// Lets everything pass.
+    /// Returns the sieve that lets everything pass.
     #[must_use]
     pub fn open() -> Self {
         let endless = T::one() / T::zero();
@@ -54,7 +54,7 @@ impl<T: Recordable> Sieve<T> {
         }
     }
 
-    /// What is left of it where some protections are turned off: no number is implausible, or stuck; readings never jump.
+    /// Returns the sieve without the protections that are turned off: no number is implausible, or stuck; readings never jump.
     #[must_use]
     pub fn under(self, protections: Protections) -> Self {
         let open = Self::open();
@@ -67,7 +67,7 @@ impl<T: Recordable> Sieve<T> {
         Self { plausible, longest_repeat_s, jump, ..self }
     }
 
-    /// For readings whose errors are alike over a time, s.
+    /// Sets the correlation time of the readings' errors, s.
     #[must_use]
     pub fn with_error_time(self, error_time_s: T) -> Self {
         Self { error_time_s, ..self }
@@ -92,12 +92,12 @@ pub struct Repeats<T> {
     pub(crate) last: Option<T>,
     pub(crate) since_s: T,
     pub(crate) repeated_s: T,
-    /// How often it has come again.
+    /// Number of repeats so far.
     pub(crate) count: T,
 }
 
 impl<T: Recordable> Repeats<T> {
-    /// Before any reading.
+    /// Starts before any reading.
     #[must_use]
     pub fn none() -> Self {
         Self { last: None, since_s: T::zero(), repeated_s: T::zero(), count: T::zero() }
@@ -144,8 +144,8 @@ impl<T: Recordable> Repeats<T> {
         Ok(Reading { extra_variance, ..reading })
     }
 
-    /// The same number for longer than a still sensor gives it. Of a converter whose step is not much smaller than the noise more
-    /// repetitions are taken for chance, and none is a fault where its step is larger.
+    /// True if the number has repeated for longer than a still sensor gives it. For a converter whose step is not much smaller than the
+    /// noise more repetitions are taken for chance; if its step is larger, none is a fault.
     fn is_stuck(&self, sieve: &Sieve<T>, extra_variance: T) -> bool {
         let codes = T::of(f64::from(MOST_CODE_REPEATS));
         let most = if extra_variance > T::zero() { codes } else { sieve.most_repeats };

@@ -1,10 +1,10 @@
-//! What is known of the strain while nothing is read.
+//! Bounds on the strain while nothing is read.
 
 use ohmstrain_model::StrainRange;
 
 use crate::Recordable;
 
-/// How far a body can have moved since it was last read.
+/// Distance that a body can have moved since it was last read.
 ///
 /// A motion's pull toward a mean strain, and the spread that this leaves in the long run, are fitted where every row has a
 /// reading: for a pause they promise nothing. Without the pull a rate v̇ = -v/T + noise that was known moves the strain in t
@@ -15,7 +15,7 @@ use crate::Recordable;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Unread<T> {
-    /// How long a rate lasts, s.
+    /// Correlation time of the rate, s.
     pub rate_time_s: T,
     /// Twice the variance of a path with the rate's deviation for that long.
     pub path_variance: T,
@@ -25,11 +25,11 @@ pub struct Unread<T> {
     pub anywhere: T,
 }
 
-/// Since when, s, nothing has been read before the first reading of all.
+/// Time since the last reading, s, that is assumed before the first reading of all.
 pub const NEVER_READ_S: f64 = 1e9;
 
 impl<T: Recordable> Unread<T> {
-    /// Of a motion whose rate lasts for `rate_time_s`, with a standard deviation, 1/s.
+    /// Computes the bounds for a motion whose rate lasts for `rate_time_s`, with a standard deviation, 1/s.
     ///
     /// ```
     /// use ohmstrain_ekf::live::Unread;
@@ -62,7 +62,7 @@ impl<T: Recordable> Unread<T> {
 }
 
 impl Unread<f64> {
-    /// The same in another precision.
+    /// Converts it to another precision.
     #[must_use]
     pub fn to<T: Recordable>(&self) -> Unread<T> {
         Unread {

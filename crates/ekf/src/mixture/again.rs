@@ -10,11 +10,11 @@ use crate::{Curve, Reading, SparseEkf, StepError, Switch};
 /// Growth of what correlations lose from one try to the next.
 const LOOSER: f64 = 16.0;
 
-/// What a step hears. Of two types: a program that always has a reading has no code for pauses.
+/// Reading of a step, present or missing. There are two types: a program that always has a reading has no code for pauses.
 pub(crate) trait Hearing<T: Scalar>: Copy {
     fn reading(self) -> Option<Reading<T>>;
 
-    /// What a refused step hears at a further try; the refusal where that is of no use.
+    /// Returns the reading for a further try of a refused step; the refusal if another try is of no use.
     fn again<S: Switch<T>, const B: usize, const N: usize, G: Curve<T>>(
         self,
         kernel: &SparseEkf<T, S, B, N, G>,

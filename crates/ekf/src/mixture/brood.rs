@@ -19,28 +19,28 @@ pub(crate) struct Parents<V: Lanes> {
     pub weight: V,
     /// One over the probability of the limits.
     pub per_inside: V,
-    /// In which lanes there is one.
+    /// Lanes that hold a parent.
     pub there: V::Mask,
-    /// Which of them come from each phase, and how likely each follows.
+    /// Lanes of the parents in each phase; then, for each phase, the probability that it follows.
     pub from: [V::Mask; 3],
     pub follows: [V; 3],
-    /// What their rates leave open over the step; `None` if a reading is missing to tell their directions, which vectors do not
-    /// know of.
+    /// Open path of their rates over the step; `None` if there is no reading to tell their directions. Vectors handle no such
+    /// steps.
     pub turning: Option<Turning<V>>,
 }
 
-/// Sees children on their way to the reading.
+/// Recorder of children on their way to the reading.
 pub(crate) trait Trail<V: Lanes, const B: usize> {
-    /// Where they started: their parents' beliefs, the rate drawn anew where a phase `begins`.
+    /// Records the starts: the parents' beliefs, with a new rate where a phase `begins`.
     fn starts(&mut self, _from: &Parts<V, B>, _begins: V::Mask, _course: &Course<V>) {}
     /// The prediction before it is cut.
     fn ahead(&mut self, _predicted: &Parts<V, B>) {}
 }
 
-/// Nobody looks.
+/// Trail that records nothing.
 impl<V: Lanes, const B: usize> Trail<V, B> for () {}
 
-/// What somebody who listens is told of a child.
+/// Data of a child that a recorder receives.
 struct Seen<T, const B: usize> {
     from: Parts<T, B>,
     begins: bool,
@@ -66,16 +66,16 @@ impl<T: Real, const B: usize> Trail<T, B> for Option<Seen<T, B>> {
 
 /// A filter whose hypotheses have a child in each phase at most.
 pub(crate) trait Breeds<T: Real, const B: usize, const N: usize> {
-    /// What splits uncertain rates, and takes roots, where numbers are stepped one by one.
+    /// Switch that splits uncertain rates, and takes roots, where numbers are stepped one by one.
     type Switch: Switch<T>;
 
     fn weighing(&self) -> &Weighing<T>;
 
-    /// Probabilities of the phases that follow one; `open` if its direction is not asked.
+    /// Probabilities of the phases that follow one; `open` if its direction is not used.
     fn follows(&self, from: Phase, open: bool) -> [T; 3];
 
-    /// What hypotheses leave open whose rates may turn around, of those that come `from` each phase; `was_open` if their directions were
-    /// not asked in the step before.
+    /// Returns the open path of hypotheses whose rates may turn around, for those `from` each phase; `was_open` if their directions were
+    /// not used in the step before.
     fn turning<V: Several<Number = T>, X: Switch<V>>(
         &self,
         from: &[V::Mask; 3],
@@ -99,9 +99,9 @@ pub(crate) struct Breeding<'a, F, T, const B: usize, const N: usize, const L: us
     pub filter: &'a F,
     pub state: &'a Mixture<T, N, L, K>,
     pub reading: Option<Reading<T>>,
-    /// What is filled with the children.
+    /// Mixture that is filled with the children.
     pub next: &'a mut Mixture<T, N, L, K>,
-    /// Whether directions stay open.
+    /// True if directions stay open.
     pub open: bool,
     pub branches: PhantomData<[T; B]>,
 }
@@ -111,7 +111,7 @@ type Said<T> = Result<Option<MixtureResidual<T>>, StepError>;
 impl<F: Breeds<T, B, N>, T: Real, const B: usize, const N: usize, const L: usize, const K: usize>
     Breeding<'_, F, T, B, N, L, K>
 {
-    /// In vectors where there are any, unless somebody listens to each child, or directions stay open.
+    /// Computes the step in vectors if there are any, unless a recorder follows each child, or directions stay open.
     #[inline(always)]
     pub(crate) fn done(self, recorder: &mut impl Recorder<T, B>) -> Said<T> {
         let Self { filter, state, reading, next, open, branches } = self;
@@ -226,7 +226,7 @@ impl<F: Breeds<T, B, N>, T: Real, const B: usize, const N: usize, const L: usize
     }
 }
 
-/// What the children of hypotheses in the lanes of vectors share.
+/// Returns the values that the children of hypotheses in the lanes of vectors share.
 #[inline(always)]
 fn side_by_side<F, V, const B: usize, const N: usize, const L: usize>(
     filter: &F,

@@ -20,16 +20,16 @@ pub(crate) struct Children<'a, T, const N: usize, const L: usize, const K: usize
 }
 
 impl<'a, T: Real, const N: usize, const L: usize, const K: usize> Children<'a, T, N, L, K> {
-    /// In the place of what `kept` has been, `room` at most.
+    /// Starts collecting children in place of the hypotheses in `kept`, `room` at most.
     #[inline(always)]
     pub(crate) fn new(kept: &'a mut Mixture<T, N, L, K>, room: usize) -> Self {
         kept.clear(room);
         Self { kept, exponent: T::zero(), density: T::zero() }
     }
 
-    /// Adds a child: merged with one that says the same, or in a free place. Where there is none the lightest of all makes room
-    /// and is merged with the nearest of its phase: dropped, step after step, what is unlikely in each of many short steps and
-    /// likely in all of them together would be lost before a reading has spoken for it. Says where it went.
+    /// Adds a child: merged with one that is alike, or in a free place. If there is none, the lightest of all makes room
+    /// and is merged with the nearest of its phase. If it were dropped, step after step, a course that is unlikely in each of many short steps
+    /// and likely in all of them together would be lost before a reading could support it. Returns the child's place.
     pub(crate) fn add<V: Several<Number = T>, const B: usize>(
         &mut self,
         children: &Parts<V, B>,
@@ -68,14 +68,14 @@ impl<'a, T: Real, const N: usize, const L: usize, const K: usize> Children<'a, T
         added
     }
 
-    /// Where the lightest is, and its weight.
+    /// Returns the index and weight of the lightest hypothesis.
     fn lightest(&self) -> (usize, T) {
         let weights = self.kept.shares().iter().map(|share| share.weight).enumerate();
         let lighter = |a: (usize, T), b: (usize, T)| if b.1 < a.1 * T::of(1.0 - LIGHTER) { b } else { a };
         weights.reduce(lighter).unwrap_or((0, T::zero()))
     }
 
-    /// Merges what is at a place into the nearest of its phase, and says where that is.
+    /// Merges the hypothesis at a place into the nearest of its phase, and returns the place of that.
     #[inline(never)]
     fn displace<const B: usize>(&mut self, at: usize) -> Option<usize> {
         let (share, phase) = self.kept.iter_mut().nth(at)?;
@@ -83,7 +83,7 @@ impl<'a, T: Real, const N: usize, const L: usize, const K: usize> Children<'a, T
         self.merge_into_nearest(&displaced, phase, counts, Some(at))
     }
 
-    /// Merges a child into the nearest of its phase, not counting the one at `but`, and says where that is; if there is none,
+    /// Merges a child into the nearest of its phase, not counting the one at `but`, and returns the place of that; if there is none,
     /// or it is negligible, it is dropped.
     #[inline(never)]
     fn merge_into_nearest<const B: usize>(

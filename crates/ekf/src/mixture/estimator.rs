@@ -1,4 +1,4 @@
-//! What the filters of hypotheses have in common around a step: in place, into a state that is there already, backwards, and as
+//! Common steps of the filters of hypotheses: in place, into an existing state, backwards, and as
 //! [`Estimator`](crate::Estimator), whose prepared step is the filter itself, made for that length.
 
 /// Its length of a step, and the estimator, of a filter whose state is `$state`.
@@ -10,7 +10,7 @@ macro_rules! mixture_filter {
                 self.kernel.model()
             }
 
-            /// Goes on with steps of another length.
+            /// Changes the length of steps.
             ///
             /// # Errors
             /// If `dt_s` is negative or not finite; the filter stays as it was.
@@ -71,7 +71,7 @@ macro_rules! mixture_filter {
 }
 pub(crate) use mixture_filter;
 
-/// How a filter over a chain of all phases begins, and for steps of how many seconds it is.
+/// Constructor and time step of a filter over a chain of all phases.
 macro_rules! over_phases {
     ($filter:ident<$($size:ident),+>) => {
         impl<T: Real, $(const $size: usize),+> $filter<T, $($size),+> {
@@ -104,12 +104,13 @@ macro_rules! over_phases {
                 }
             }
 
-            /// A phase changes at the beginning of a step: steps are short against phases, and against what the model asks for.
+            /// Returns the longest step, s. A phase changes at the beginning of a step: steps are short against
+            /// phases, and no longer than the model's.
             fn longest_s(&self) -> T {
                 self.model().longest_step_s().min(self.dwell.longest_step_s())
             }
 
-            /// The same filter for steps of another length.
+            /// Returns the filter for steps of another length.
             fn every(&self, dt_s: T) -> Self {
                 let mut other = *self;
                 other.kernel.set_length(dt_s);
@@ -152,7 +153,7 @@ macro_rules! mixture_steps {
             }
         }
 
-        /// Never inlined: a program has it once, for the first try and for all others.
+        /// Steps once, never inlined: a program has it once, for the first try and for all others.
         #[inline(never)]
         fn step_once<const L: usize>(
             &self,

@@ -6,7 +6,7 @@ use crate::mixture::LEAST_INSIDE;
 use crate::mixture::predicted::Predicted;
 use crate::{Curve, Innovation, Reading, Residual, SparseEkf, StepError, Switch};
 
-/// What weighs hypotheses, in every filter that keeps some.
+/// Evidence that weighs hypotheses, in every filter that keeps several.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -66,7 +66,7 @@ impl<T: Real> Weighing<T> {
         Self { limits: evidence.limits, tempering: evidence.tempering, clear }
     }
 
-    /// Of limits that nobody has checked, in `f32` an input's place each.
+    /// Creates a weighing with unchecked limits; in `f32` each may be a placeholder of an input.
     #[cfg(feature = "record")]
     pub(crate) fn of_any_limits(lower: T, upper: T) -> Self {
         Self::new(Evidence { limits: StrainRange { lower, upper }, tempering: T::one() })
@@ -119,7 +119,7 @@ impl<T: Real> Weighing<T> {
         V::both(distance.nothing().less(distance), reach.less(distance * distance))
     }
 
-    /// Out of the way of numbers that are not near a limit.
+    /// Calls [`Self::inside_near`] out of line, apart from numbers that are not near a limit.
     #[inline(never)]
     fn inside_near_apart<V: Falls<Number = T>, X: Switch<V>>(&self, ends: [V; 2], variance: V, near: V::Mask) -> V {
         self.inside_near::<V, X>(ends, variance, near)
@@ -161,18 +161,18 @@ impl<T: Real> Weighing<T> {
     }
 }
 
-/// What a child counts for.
+/// Weight of a child.
 pub(crate) struct Weighed<T> {
     /// Its prior probability times the likelihood of the reading.
     pub weight: Weight<T>,
-    /// Its probability of the limits over its parent's, which weighs it too but says nothing of the reading.
+    /// Its probability of the limits over its parent's, which weighs it too but carries no information on the reading.
     pub more_inside: T,
     /// One over the probability itself.
     pub per_inside: T,
 }
 
 impl<V: Several> Weighed<V> {
-    /// In a lane.
+    /// Returns the weight in a lane.
     #[inline(always)]
     pub(crate) fn in_lane(&self, lane: usize) -> Weighed<V::Number> {
         let Weight { factor, exponent } = &self.weight;
@@ -189,19 +189,19 @@ pub(crate) struct Newborn<'a, V: Lanes, X: Switch<V>, const B: usize> {
     pub parts: &'a mut Parts<V, B>,
     pub phase: Phase,
     pub prior: V,
-    /// What their prediction returned.
+    /// Spread of the rate that their prediction returned.
     pub spread: RateSpread<V, X>,
     /// One over their parents' probability of the limits.
     pub per_inside: V,
-    /// In which lanes there is one.
+    /// Lanes that hold a child.
     pub alive: V::Mask,
 }
 
-/// What the reading has made of them.
+/// Children after the reading.
 pub(crate) struct Heard<V: Lanes> {
     pub prior: V,
     pub alive: V::Mask,
-    /// Whose numbers are sound.
+    /// Lanes whose numbers are sound.
     pub sound: V::Mask,
     /// Zero without a reading.
     pub residual: Residual<V>,
@@ -234,7 +234,7 @@ impl<T: Real, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> SparseE
     }
 }
 
-/// How a reading compares with the prediction of a whole mixture.
+/// Comparison of a reading with the prediction of a whole mixture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MixtureResidual<T> {
     /// Reading minus the mixture's mean of it, and the mixture's variance of it.
@@ -259,7 +259,7 @@ impl<T: Scalar> MixtureResidual<T> {
         self.factor.ln() + self.exponent - T::of(0.5) * self.tempering * T::two_pi().ln()
     }
 
-    /// The same for [`Estimator`](crate::Estimator).
+    /// Converts it for [`Estimator`](crate::Estimator).
     pub(crate) fn innovation(&self) -> Result<Innovation<T>, StepError> {
         self.residual.with_log_likelihood(self.log_likelihood())
     }

@@ -44,7 +44,7 @@ struct Mode<T, const B: usize> {
     /// Its probability before the reading; what the reading makes of it.
     prior: T,
     weight: Weight<T>,
-    /// As in [`Weighed`](crate::mixture::evidence::Weighed).
+    /// See [`Weighed`](crate::mixture::evidence::Weighed).
     more_inside: T,
     per_inside: T,
     residual: Option<Residual<T>>,
@@ -75,7 +75,7 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, 
         }
     }
 
-    /// What a refused step starts from, and hears, at a further try.
+    /// Returns the reading for a further try of a refused step, and loosens the state that it starts from.
     #[cold]
     #[inline(never)]
     fn again<const L: usize>(
@@ -156,8 +156,8 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, 
         Ok(mode)
     }
 
-    /// What is known of the state if `phase` begins or goes on now; if it cannot, what was known of the phase. The rate of
-    /// a hold is left out: its prediction does not look at it.
+    /// Mixes the modes into the belief with which `phase` begins or goes on now; returns the phase's own belief if neither is possible. The rate
+    /// of a hold is left out: its prediction does not use it.
     #[inline(always)]
     fn mixed<const L: usize>(&self, modes: &[Share<T, N, L>; 3], phase: Phase) -> Mode<T, B> {
         let (zero, to) = (T::zero(), phase.index());
@@ -182,7 +182,7 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, 
     }
 }
 
-/// What went well, without moving it.
+/// Borrows the value of a result, without moving it.
 fn borrowed<T>(result: &Result<T, StepError>) -> Result<&T, StepError> {
     result.as_ref().map_err(|error| *error)
 }

@@ -39,7 +39,7 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, 
         Ok(smoothed)
     }
 
-    /// What is known of the state if `phase` begins or goes on now, and its probability; every part of it is put into `mixing`.
+    /// Mixes the belief with which `phase` begins or goes on now, and returns its probability; every part of it is put into `mixing`.
     fn mix<const L: usize>(
         &self,
         filtered: &PhaseMixture<T, N, L>,

@@ -1,4 +1,4 @@
-//! Who descends from whom in a step of a filter of hypotheses: what its smoother goes back along.
+//! Lineage of the children in a step of a filter of hypotheses: the record that its smoother follows backwards.
 
 use nalgebra::{SMatrix, SVector};
 use ohmstrain_model::{Direction, Phase, SwitchedModel, SwitchedStep, Symmetric, Transition};
@@ -11,9 +11,9 @@ use crate::mixture::state::Share;
 use crate::mixture::{Added, moment_match};
 use crate::smooth::rts_step;
 
-/// Hears of every child that a step of a filter of hypotheses makes. The filter itself listens with `()`.
+/// Recorder of every child that a step of a filter of hypotheses makes. The filter itself uses `()`, which records nothing.
 pub(crate) trait Recorder<T: Real, const B: usize> {
-    /// Whether it wants to hear of each.
+    /// True if it wants a call for each child.
     const LISTENS: bool = true;
 
     /// A child was put into the new mixture, merged or alone.
@@ -28,12 +28,12 @@ impl<T: Real, const B: usize> Recorder<T, B> for () {
 
 /// A child at its birth.
 pub(crate) struct Birth<'a, T, const B: usize> {
-    /// Which hypothesis it comes from.
+    /// Index of the parent hypothesis.
     pub parent: usize,
     pub phase: Phase,
-    /// Where it started: the parent's belief, the rate drawn anew if a phase began.
+    /// Starting point: the parent's belief, with a new rate if a phase began.
     pub from: &'a Parts<T, B>,
-    /// Whether a phase began.
+    /// True if a phase began.
     pub begins: bool,
     pub course: Course<T>,
     /// The prediction before it was cut.
@@ -46,13 +46,13 @@ pub(crate) struct Birth<'a, T, const B: usize> {
 /// The children of one step. Source of the recursion: Kim, *J. Econometrics* 60 (1994) 1, here over hypotheses that are merged
 /// and pruned.
 pub(crate) struct Lineage<T, const N: usize, const L: usize, const K: usize> {
-    /// By parent and phase.
+    /// Children, indexed by parent and phase.
     children: [[Option<Descent<T, N, L>>; 3]; K],
 }
 
 /// A child and where it went.
 pub(crate) struct Descent<T, const N: usize, const L: usize> {
-    /// From the parent, the renewed rate included.
+    /// Transition from the parent, the renewed rate included.
     pub transition: Transition<T, N, L>,
     pub predicted: Belief<T, N, L>,
     pub posterior: Belief<T, N, L>,
@@ -61,15 +61,15 @@ pub(crate) struct Descent<T, const N: usize, const L: usize> {
     pub heir: usize,
 }
 
-/// Listens to a step of a sensor's filter: its linearisations are those of the model.
+/// Recorder of a step of a sensor's filter: its linearisations are those of the model.
 pub(crate) struct Following<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize> {
     pub lineage: Lineage<T, N, L, K>,
     model: &'a SwitchedModel<T, B, N>,
     step: SwitchedStep<T, B>,
 }
 
-/// Variances, and squared distances of means, that are this many times what the filter states are none that later readings
-/// can have told. What is known of a merged hypothesis is known of its children but roughly, and where a state decays
+/// Limits on smoothed variances, and squared distances of means, over the filter's own: later readings cannot cause larger
+/// ratios. A merged hypothesis represents its children only roughly, and where a state decays
 /// without noise the way back makes an excess grow with every step, e-fold in each time constant: in a gap without bound.
 const ASTRAY: [f64; 2] = [4.0, 400.0];
 
@@ -135,7 +135,7 @@ fn whole<T: Real, const B: usize, const N: usize, const L: usize>(parts: &Parts<
     belief
 }
 
-/// The transition from before a phase began: the rate that is drawn anew does not depend on what it was, and its spread is
+/// Returns the transition from before a phase began: the new rate does not depend on the old one, and its spread is
 /// process noise.
 pub(crate) fn through_renewal<T: Real, const N: usize, const L: usize>(
     transition: Transition<T, N, L>,
@@ -148,7 +148,7 @@ pub(crate) fn through_renewal<T: Real, const N: usize, const L: usize>(
 }
 
 impl<T: Real, const N: usize, const L: usize> Descent<T, N, L> {
-    /// What all readings say of this child, from what they say of the hypothesis it was merged into.
+    /// Returns the smoothed belief of this child, from the smoothed belief of the hypothesis it was merged into.
     ///
     /// A child that is far from the merged mean must not be drawn there: the merged hypothesis counts as the child plus
     /// noise of the size of their distance, and the smoother goes back through that.

@@ -3,10 +3,10 @@ use ohmstrain_model::Scalar;
 use crate::kernel::{Part, Parts};
 use crate::{Belief, Gaussian};
 
-/// Where a mixture's mean of one component of the state lies, and its parts around it.
+/// Mean of one component of the state over a mixture, and its parts around it.
 #[derive(Clone, Copy)]
 struct Shift<T> {
-    /// Which component.
+    /// Index of the component.
     i: usize,
     mean: T,
     /// Deviations of the lighter parts from the heaviest one, with their weights.
@@ -46,9 +46,9 @@ impl<T: Scalar, const N: usize, const L: usize> Mixing<'_, T, N, L> {
         Shift { i, mean: heaviest + shift, weighted, off: [b - shift, c - shift] }
     }
 
-    /// With deviations d from the heaviest part's mean and s the mixture's own, `Σ w (d - s)(d - s)ᵀ = Σ w d (d - s)ᵀ`, and
-    /// the heaviest part has d = 0. As its weight is a third at least, s is no more than √3 deviations of the mixture, and
-    /// nothing cancels.
+    /// Returns an entry of the mixture's covariance. With deviations d from the heaviest part's mean and s the mixture's own,
+    /// `Σ w (d - s)(d - s)ᵀ = Σ w d (d - s)ᵀ`, and the heaviest part has d = 0. As its weight is a third at least, s is no more
+    /// than √3 deviations of the mixture, and nothing cancels.
     #[inline(always)]
     fn entry(&self, i: &Shift<T>, j: &Shift<T>) -> T {
         let [w0, w1, w2] = self.weights;
@@ -97,8 +97,8 @@ impl<T: Scalar, const B: usize> Parts<T, B> {
         }
     }
 
-    /// Puts the rate of a moving phase into a mixture: the phase's own with the share `kept`, with the rest one that is
-    /// drawn anew, independent of everything else.
+    /// Puts the rate of a moving phase into a mixture: the phase's own with the share `kept`, with the rest a new one,
+    /// independent of everything else.
     #[inline(always)]
     pub(crate) fn mix_rate<const N: usize, const L: usize>(
         &mut self,

@@ -29,23 +29,23 @@ use ohmstrain_model::{Scalar, Symmetric};
 
 use crate::{Belief, Gaussian};
 
-/// Where a hypothesis went.
+/// Place of a hypothesis after it was added.
 #[derive(Clone, Copy)]
 pub(crate) enum Added {
     /// Into this place, alone or merged with what was there.
     To(usize),
     /// Into this place; what was there was merged into the other one, or dropped if no other is of its phase.
     InsteadOf(usize, Option<usize>),
-    /// It is lighter than everything there is room for, and none of that is of its phase.
+    /// No place: it is lighter than every hypothesis there is room for, and none of those is of its phase.
     Nowhere,
 }
 
-/// When two hypotheses of one phase count as one: squared distance of their strains plus that of their rates, each in
-/// units of the larger variance.
+/// Threshold below which two hypotheses of one phase are merged: squared distance of their strains plus that of their rates,
+/// each in units of the larger variance.
 pub(crate) const ALIKE: f64 = 0.5;
 /// Hypotheses lighter than the heaviest by this factor, e⁻¹², are dropped.
 pub(crate) const LEAST_WEIGHT: f64 = 6.144_212_353_328_21e-6;
-/// Of two hypotheses whose weights differ by no more than this share none is the lighter one: directions after a hold are
+/// Relative difference of two weights up to which neither hypothesis is the lighter one: directions after a hold are
 /// equally likely, and rounding is not to choose.
 pub(crate) const LIGHTER: f64 = 1e-4;
 /// A hypothesis that has left the limits altogether is no less likely than this.

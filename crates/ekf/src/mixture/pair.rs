@@ -1,9 +1,9 @@
-//! Two hypotheses: whether they say the same, and what they say together.
+//! Comparison of two hypotheses, and their merging.
 
 use crate::kernel::{Lanes, Parts};
 use crate::mixture::ALIKE;
 
-/// What tells whether hypotheses are alike.
+/// Moments that tell whether hypotheses are alike.
 #[derive(Clone, Copy)]
 pub(crate) struct About<V> {
     pub strain: V,
@@ -19,7 +19,7 @@ impl<V: Lanes> About<V> {
         Self { strain, strain_variance, rate, rate_variance }
     }
 
-    /// Where two hypotheses of one phase count as one.
+    /// Lanes where two hypotheses of one phase are alike, to be merged.
     #[inline(always)]
     pub(crate) fn is_like(&self, other: &Self) -> V::Mask {
         let alike = self.strain.literal(ALIKE);

@@ -1,4 +1,4 @@
-//! What a pause of the readings is to hypotheses about the sign of the rate.
+//! Pause of the readings, for hypotheses about the sign of the rate.
 
 use ohmstrain_model::{Phase, Scalar};
 
@@ -6,12 +6,12 @@ use crate::Belief;
 use crate::substeps::GRACE;
 use crate::{Gaussian, Real};
 
-/// For how long there has been no reading.
+/// Time without a reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Pause<T> {
     seconds: T,
-    /// Whether the phase of what moves is where it came from, and its rate may have either sign by now.
+    /// True if moving hypotheses keep the phase of their parents, and their rates may have either sign by now.
     pub open: bool,
 }
 
@@ -20,7 +20,7 @@ impl<T: Scalar> Pause<T> {
         Self { seconds: T::zero(), open: false }
     }
 
-    /// After a step of `dt_s` more seconds without a reading; the direction stays open from `longest_s` on.
+    /// Adds a step of `dt_s` seconds without a reading; the direction stays open from `longest_s` on.
     pub(crate) fn goes_on(self, dt_s: T, longest_s: T) -> Self {
         let seconds = self.seconds + dt_s;
         Self { seconds, open: seconds > longest_s * T::of(GRACE) }
@@ -30,7 +30,7 @@ impl<T: Scalar> Pause<T> {
 /// Sums up the probabilities of phases.
 pub(crate) struct PhaseSum<T> {
     pub sums: [T; 3],
-    /// Whether the sign of the rate tells the phase of what moves.
+    /// True if the phase of a moving hypothesis follows from the sign of its rate.
     open: bool,
 }
 

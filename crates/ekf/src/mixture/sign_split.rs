@@ -22,15 +22,15 @@ use crate::{
     AnyCurve, Compact, Curve, Dwell, Evidence, Gaussian, MixtureResidual, Reading, SparseEkf, StepError, Switch,
 };
 
-/// At most `K` Gaussian hypotheses split by the sign of the rate.
+/// Filter with at most `K` Gaussian hypotheses, split by the sign of the rate.
 ///
 /// Each predicted Gaussian is cut at rate zero. The masses of the halves are the probabilities of stretching and
 /// releasing, and each half drives the branches with its own gains. With a [`Dwell`] there is a hold phase besides,
 /// entered and left by the chain's probabilities; its moving phases turn around by crossing rate zero, not by the chain.
 ///
-/// In a pause of the readings nothing is cut any more once the rate has forgotten its direction: a Gaussian whose tail is cut off
-/// and merged with the other half at every row would forget it the sooner the more rows there are, and with it how far the body
-/// may have gone. Each hypothesis then moves on with an uncertain direction, as that of an [`Ekf`](crate::Ekf), and the next
+/// During a pause of the readings nothing is cut any more once the rate has forgotten its direction. A Gaussian whose tail is cut off
+/// and merged with the other half at every row would forget it sooner the more rows there are, and with it how far the body may have
+/// gone. Instead each hypothesis moves on with an uncertain direction, as that of an [`Ekf`](crate::Ekf) does, and the next
 /// reading splits it.
 ///
 /// A truncated Gaussian-sum split. `G` as for [`SparseEkf`].
@@ -82,7 +82,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
         longest_cut_s(self.model())
     }
 
-    /// The same filter for steps of another length.
+    /// Returns the filter for steps of another length.
     fn every(&self, dt_s: T) -> Self {
         let mut other = *self;
         other.kernel.set_length(dt_s);
@@ -194,8 +194,8 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
 /// A cut that leaves less than this of a prediction is not followed: its moments would be those of a far tail.
 pub(crate) const LEAST_MASS: f64 = 1e-3;
 
-/// Probabilities of the phases that follow `phase`, in the order of [`Phase::ALL`]. Whether a moving body stretches or
-/// releases is for the cut to say.
+/// Returns the probabilities of the phases that follow `phase`, in the order of [`Phase::ALL`]. The cut at rate zero decides
+/// between stretching and releasing.
 fn follows<T: Real>(chain: Option<&[[T; 3]; 3]>, phase: Phase) -> [T; 3] {
     match (chain, phase) {
         (None, _) => [T::one(), T::zero(), T::one()],
@@ -204,7 +204,7 @@ fn follows<T: Real>(chain: Option<&[[T; 3]; 3]>, phase: Phase) -> [T; 3] {
     }
 }
 
-/// The same where the direction stays open: a movement goes on as one, until a reading splits it.
+/// Returns the probabilities if the direction stays open: a movement goes on as one, until a reading splits it.
 fn goes_on<T: Real>(chain: Option<&[[T; 3]; 3]>, phase: Phase) -> [T; 3] {
     let (stops, zero) = (chain.map_or(T::zero(), |chain| chain[0][1]), T::zero());
     match (chain, phase) {

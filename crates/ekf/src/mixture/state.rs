@@ -81,11 +81,11 @@ impl<T: Real, const N: usize, const L: usize> PhaseMixture<T, N, L> {
     /// A phase has one place.
     const fn take_beside(&mut self, _other: &Self, _share: T) {}
 
-    /// There are three phases.
+    /// Does nothing: there are three phases.
     const fn keep(&mut self, _most: usize) {}
 }
 
-/// At most `K` Gaussians, each stretching, holding or releasing: what [`SignSplit`](crate::SignSplit) and
+/// Mixture of at most `K` Gaussians, each stretching, holding or releasing: the state that [`SignSplit`](crate::SignSplit) and
 /// [`Hypotheses`](crate::Hypotheses) carry from step to step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mixture<T, const N: usize, const L: usize, const K: usize> {
@@ -222,7 +222,7 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K
     }
 }
 
-/// What both have in common.
+/// Implementation of [`State`] that both states share.
 macro_rules! mixture_state {
     ($state:ident<T, N, L $(, $k:ident)?>) => {
         impl<T: Real, const N: usize, const L: usize $(, const $k: usize)?> State<T, N, L>

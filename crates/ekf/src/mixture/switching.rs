@@ -39,7 +39,7 @@ pub(crate) fn forgets_direction_s<T: Scalar, const B: usize, const N: usize>(mod
     T::of(3.0) * longest_cut_s(model)
 }
 
-/// How long phases last and what follows them: a Markov chain in continuous time over extend, hold and retract.
+/// Durations of phases and the phases that follow: a Markov chain in continuous time over extend, hold and retract.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dwell<T> {
     hold_s: T,

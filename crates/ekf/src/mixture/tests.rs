@@ -57,8 +57,8 @@ fn kept(mixture: &Mixture<f64, 3, 6, 2>) -> Vec<One> {
 const ROUNDING: f64 = 1e-13;
 
 proptest! {
-    /// Hypotheses of which each is like the first: however many are added, one of that phase is left, and what the
-    /// mixture says of the state and of the phases is the same.
+    /// Merging of hypotheses that are like the first: however many are added, one of that phase is left, and the
+    /// mixture's moments and phase probabilities stay.
     #[test]
     fn merging_preserves_weight_mean_and_covariance(
         first in one(), others in prop::collection::vec(one(), 1..6), apart in one(),
@@ -145,7 +145,7 @@ fn the_lightest_makes_room() {
     assert!((strains[0] - merged).abs() < 1e-15 && strains[1] == 0.3, "{strains:?}");
 }
 
-/// In no unit are two exactly known strains that differ the same strain.
+/// Two exactly known strains that differ are different in every unit.
 #[test]
 fn exactly_known_states_are_alike_only_if_they_are_equal() {
     for unit in [1e-9, 1.0, 1e9] {
@@ -203,7 +203,7 @@ fn split() -> Split {
     Split::new(model, 0.1, None, Evidence::new(StrainRange { lower: -9.0, upper: 9.0 }, 1.0).unwrap()).unwrap()
 }
 
-/// At strains 0, -0.5 and 0.5, of which there is room for the children of two.
+/// Returns a state with strains 0, -0.5 and 0.5, with room for the children of two.
 fn of(weights: &[f64]) -> State {
     let mut state = State::empty();
     for (strain, weight) in [0.0, -0.5, 0.5].into_iter().zip(weights.iter().copied()) {
@@ -224,7 +224,7 @@ fn weights(state: &State) -> Vec<f64> {
 }
 
 /// Two hypotheses whose weights differ by less than the margin within which none is the lighter one: the children that came
-/// first are kept, those of the heavier are merged with the nearest. The strain is then told to be that of the first, so it
+/// first are kept, those of the heavier are merged with the nearest. The strain is then set to that of the first, so it
 /// was that before.
 #[test]
 fn a_smoother_goes_back_along_what_ran_forward_at_a_tie() {
@@ -241,7 +241,7 @@ fn a_smoother_goes_back_along_what_ran_forward_at_a_tie() {
     assert!((back.shares()[1].belief.mean[0] + 0.5).abs() < 0.01);
 }
 
-/// What is negligible is dropped after a step, and the places of the others move up: of two, the second is followed.
+/// Negligible hypotheses are dropped after a step, and the places of the others move up: of two, the second is followed.
 #[test]
 fn what_moves_up_is_followed() {
     let state = of(&[1e-8, 1.0]);
@@ -255,9 +255,9 @@ fn what_moves_up_is_followed() {
     assert!((known.mean - smoothed.mean).amax() < 1e-9, "{smoothed:?}");
 }
 
-/// What says nothing new changes no weight, by the law of total probability. Without a reading nothing is lost: what there
-/// is no room for is merged with the nearest, whether it was displaced (the last is the heavier) or came too late (the
-/// last is the lighter).
+/// A step without new information changes no weight, by the law of total probability. Without a reading nothing is lost: a
+/// hypothesis that there is no room for is merged with the nearest, whether it was displaced (the last is the heavier) or came too
+/// late (the last is the lighter).
 #[test]
 fn what_was_merged_is_followed() {
     for filtered in [[0.997, 1e-3, 2e-3], [0.997, 2e-3, 1e-3]] {
@@ -270,7 +270,7 @@ fn what_was_merged_is_followed() {
     }
 }
 
-/// Listens, so that every child is stepped by itself.
+/// Recorder that makes the filter step every child by itself.
 struct Listener;
 
 impl super::lineage::Recorder<f64, 2> for Listener {}
@@ -301,8 +301,8 @@ fn in_vectors_and_one_by_one<F: Breeds<f64, 2, 5>>(filter: &F, start: &Belief<f6
     most
 }
 
-/// What is followed in vectors is what is followed hypothesis by hypothesis, to the last bit: whether a processor has
-/// vectors, and whether somebody listens, shall not be seen in a result. Without vectors this says nothing.
+/// Vectors give the same result as numbers one by one, to the last bit: no result may depend on the processor's
+/// vectors, or on a recorder. On a processor without vectors the test shows nothing.
 #[test]
 fn vectors_give_the_bits_of_numbers() {
     let branch = |tau_s, slope| Branch {

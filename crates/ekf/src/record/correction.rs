@@ -7,10 +7,10 @@ use ohmstrain_model::{Number, StrainRange};
 use std::format;
 use std::vec::Vec;
 
-/// What surrounds the sums of a filter's correction over its rows. Inputs and results are called as the arguments say.
+/// Functions around the sums of a filter's correction over its rows. The names of inputs and results are those of the arguments.
 impl Correction<'_, f32, FILTER_INPUTS> {
-    /// Of inputs `x` on the scale of the rows, and squares of how far each was outside of their range: the distances
-    /// `outside_direct` and `outside_residual`, and what the processes say before any row, `direct` and `residual`.
+    /// Records the scaled inputs. From inputs `x` on the scale of the rows, and squares of the distance of each outside their range: the
+    /// distances `outside_direct` and `outside_residual`, and the processes' predictions before any row, `direct` and `residual`.
     #[must_use]
     pub fn write_inputs(&self, quadratics: Option<&[Quadratic<'_, f32>; 2]>) -> Function {
         write_down(|writer| {
@@ -37,7 +37,7 @@ impl Correction<'_, f32, FILTER_INPUTS> {
         })
     }
 
-    /// Of squares of how far each feature was outside of the range of the simulated rows the distance.
+    /// Records the distance from the range of the simulated rows, given the square of each feature's distance.
     #[must_use]
     pub fn write_simulated_distance(&self, of: &Simulated<'_, f32, FILTER_INPUTS>) -> Function {
         write_down(|writer| {
@@ -56,7 +56,8 @@ impl Correction<'_, f32, FILTER_INPUTS> {
         })
     }
 
-    /// What the simulated rows say, of the sum over them, `sum`, the scaled reading and the distance `outside`: `mean` and `variance`.
+    /// Records the prediction of the simulated rows, given the sum over them, `sum`, the scaled reading and the
+    /// distance `outside`: `mean` and `variance`.
     #[must_use]
     pub fn write_simulated(&self, of: &Simulated<'_, f32, FILTER_INPUTS>) -> Function {
         write_down(|writer| {
@@ -66,8 +67,8 @@ impl Correction<'_, f32, FILTER_INPUTS> {
         })
     }
 
-    /// What the direct process says, of its `sum`, what inducing rows explain, the scaled reading and the distance `outside`: `mean`
-    /// and `variance`.
+    /// Records the prediction of the direct process, given its `sum`, the variance that inducing rows explain, the scaled reading and the
+    /// distance `outside`: `mean` and `variance`.
     #[must_use]
     pub fn write_direct(&self) -> Function {
         write_down(|writer| {
@@ -78,7 +79,7 @@ impl Correction<'_, f32, FILTER_INPUTS> {
         })
     }
 
-    /// What the residual process and the filter (`filtered`, `filtered_variance`) say together: `mean`, `variance`, and the
+    /// Records the combination of the residual process and the filter (`filtered`, `filtered_variance`): `mean`, `variance`, and the
     /// `novelty` of the inputs.
     #[must_use]
     pub fn write_residual(&self) -> Function {
@@ -93,7 +94,7 @@ impl Correction<'_, f32, FILTER_INPUTS> {
         })
     }
 
-    /// What is learned, of the variance that voices were mixed to, of `novelty` and of `birge`.
+    /// Records the variance of the corrected strain, given the variance of the voices' mixture, `novelty` and `birge`.
     #[must_use]
     pub fn write_learned(&self) -> Function {
         write_down(|writer| {
@@ -141,7 +142,7 @@ pub fn write_mixture() -> Function {
     })
 }
 
-/// Scales that nobody asks for.
+/// Scales that are not used.
 const UNSCALED: [InputScale<Expression<'static>>; FILTER_INPUTS] = {
     let none = Expression::ZERO;
     [InputScale { mean: none, sd: none, lower: none, upper: none }; FILTER_INPUTS]
@@ -170,7 +171,7 @@ fn value<'t>(of: &Quadratic<'_, f32>, x: &[Expression<'t>]) -> Expression<'t> {
     Quadratic { linear: &linear, square: &square }.value(x)
 }
 
-/// Inputs from a first one on, handed over as a list; those before it are not asked for.
+/// Returns inputs from a first one on, handed over as a list; those before it are not used.
 fn inputs_from<'t>(writer: &Writer<'t>, first: usize, name: &str) -> [Expression<'t>; FILTER_INPUTS] {
     core::array::from_fn(|i| {
         i.checked_sub(first).map_or(Expression::ZERO, |place| writer.input(&format!("{name}[{place}]")))

@@ -15,7 +15,7 @@ pub struct Expression<'a>(pub(super) Kind<'a>);
 
 #[derive(Clone, Copy)]
 pub(super) enum Kind<'a> {
-    /// Of no tape yet.
+    /// A literal, on no tape yet.
     Literal(f32),
     On(&'a Tape, Place),
 }
@@ -66,7 +66,7 @@ impl<'a> Expression<'a> {
         }
     }
 
-    /// The same; of a constant it is written down as well.
+    /// Records the operation; that of a constant, too.
     fn noted(self, operation: impl Fn(Place) -> Operation) -> Self {
         self.then(|_| f32::NAN, operation)
     }
@@ -111,7 +111,7 @@ impl<'a> Expression<'a> {
         }
     }
 
-    /// The other one where a mask says so; of literals what is `done`.
+    /// Chooses the other one where a mask is set; for literals the result is `done`.
     fn either_of(self, other: Self, done: fn(f32, f32) -> f32, mask: Self) -> Self {
         match (self.0, other.0) {
             (Kind::Literal(a), Kind::Literal(b)) => Self(Kind::Literal(done(a, b))),
@@ -119,7 +119,7 @@ impl<'a> Expression<'a> {
         }
     }
 
-    /// Which way a comparison goes.
+    /// Returns the truth of a comparison on the way that is recorded.
     fn ask(self, other: Self, done: fn(f32, f32) -> bool, operation: fn(Place, Place) -> Operation) -> bool {
         match (self.constant().zip(other.constant()), self.tape(other)) {
             (Some((a, b)), _) => done(a, b),
@@ -363,7 +363,7 @@ impl Lanes for Expression<'_> {
     }
 }
 
-/// As numbers in single precision have it.
+/// Implementation for expressions, with the numbers of single precision.
 impl Falls for Expression<'_> {
     fn to_exponent(self) -> Self {
         self.noted(Operation::ToExponent)

@@ -1,13 +1,13 @@
 use crate::correction::ReadingFeatures;
 use crate::live::{Doubts, Jumps, Repeats, RestFollower};
 
-/// What a state is made of, by name: what another language keeps from step to step.
+/// Fields of a state, by name: the numbers that another language keeps from step to step.
 pub trait Fields<T> {
     /// Shows all fields.
     fn each(&mut self, see: &mut impl See<T>);
 }
 
-/// Looks at the fields of a state, and may change them.
+/// Visitor of the fields of a state, which may change them.
 pub trait See<T> {
     /// A number.
     fn number(&mut self, name: &'static str, number: &mut T);
@@ -26,7 +26,7 @@ pub trait See<T> {
         *number = numbers.map(|[number]| number);
     }
 
-    /// As many numbers as there always are.
+    /// Shows a list of numbers of fixed length.
     fn numbers<const K: usize>(&mut self, name: &'static str, numbers: &mut [T; K]);
 }
 

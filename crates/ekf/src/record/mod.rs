@@ -1,9 +1,9 @@
-//! The kernel's arithmetic written down instead of done: what a program that writes other programs needs.
+//! Recording of the kernel's arithmetic, for programs that write other programs.
 //!
 //! A tape runs the kernel on expressions and keeps every operation, in the order in which the kernel does them. Where
 //! numbers would choose a way, both ways are kept and one of the results is chosen; results are the same.
 //!
-//! What stands around the kernel compares numbers and goes one way ([`write_down`]): it is run once for every way that it may go.
+//! Code around the kernel compares numbers and goes one way ([`write_down`]): it is run once for every way that it may go.
 
 mod correction;
 mod expression;

@@ -3,7 +3,7 @@ use crate::mixture::{LEAST_WEIGHT, LIGHTER};
 use crate::substeps::GRACE;
 use crate::{Curve, Gaussian, Hypotheses, SignSplit, Switch};
 
-/// What a filter of hypotheses has besides the kernel.
+/// Numbers that a filter of hypotheses has besides the kernel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MixtureNumbers {
     /// Rate of a phase that begins.
@@ -14,20 +14,20 @@ pub struct MixtureNumbers {
     pub forgets_direction_s: f32,
 }
 
-/// What is the same in all filters of hypotheses.
+/// Numbers that are the same in all filters of hypotheses.
 pub mod shared {
     use super::{LEAST_MASS, LEAST_WEIGHT, LIGHTER};
 
     /// Hypotheses lighter than this share of the heaviest are dropped.
     pub const LEAST_WEIGHT_KEPT: f32 = LEAST_WEIGHT as f32;
-    /// Of two hypotheses one is the lighter if it is lighter than this share of the other.
+    /// Ratio of two weights below which one hypothesis is the lighter.
     pub const NOT_LIGHTER: f32 = (1.0 - LIGHTER) as f32;
-    /// What a cut leaves must be more than this.
+    /// Probability mass that a cut must leave at least.
     pub const LEAST_MASS_LEFT: f32 = LEAST_MASS as f32;
 }
 
 impl<const B: usize, const N: usize, const K: usize, S: Switch<f32>, G: Curve<f32>> SignSplit<f32, B, N, K, S, G> {
-    /// What it has besides the kernel.
+    /// Returns the numbers besides the kernel.
     #[must_use]
     pub fn numbers(&self) -> MixtureNumbers {
         let forgets = self.forgets_direction_s * GRACE as f32;
@@ -42,7 +42,7 @@ impl<const B: usize, const N: usize, const K: usize, S: Switch<f32>, G: Curve<f3
 }
 
 impl<const B: usize, const N: usize, const K: usize, S: Switch<f32>, G: Curve<f32>> Hypotheses<f32, B, N, K, S, G> {
-    /// What it has besides the kernel.
+    /// Returns the numbers besides the kernel.
     #[must_use]
     pub fn numbers(&self) -> MixtureNumbers {
         let tempering = self.weighing.tempering();

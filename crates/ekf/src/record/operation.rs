@@ -1,6 +1,6 @@
 use std::vec::Vec;
 
-/// Where an earlier operation stands in [`Recorded::operations`].
+/// Index of an earlier operation in [`Recorded::operations`].
 pub type Place = usize;
 
 /// An operation on earlier results. Sums, products and quotients are rounded one by one.
@@ -36,34 +36,34 @@ pub enum Operation {
     Falling(Place),
     /// The number with its bits shifted to where an exponent stands.
     ToExponent(Place),
-    /// What a standard normal has above a border.
+    /// Upper tail of a standard normal above a border.
     Tail(Place),
     /// Its density at the border of such a tail, over the tail.
     Hazard(Place),
-    /// Whether the first is less than the second.
+    /// True if the first is less than the second.
     Less(Place, Place),
-    /// Whether the first is not more than the second.
+    /// True if the first is not more than the second.
     AtMost(Place, Place),
-    /// Whether both are the same number.
+    /// True if both are the same number.
     Equal(Place, Place),
-    /// Whether a number is zero or more; not if it is not a number.
+    /// True if a number is zero or more; false for NaN.
     NotNegative(Place),
-    /// Whether a number is finite.
+    /// True if a number is finite.
     Finite(Place),
-    /// Whether both are true.
+    /// True if both are true.
     Both(Place, Place),
-    /// Whether one of both is true.
+    /// True if either is true.
     Either(Place, Place),
-    /// Whether it is not true.
+    /// True if it is false.
     Not(Place),
-    /// What is known to be true, or false.
+    /// A known truth value.
     Known(bool),
     /// The second where the first is true, else the third.
     Pick(Place, Place, Place),
 }
 
 impl Operation {
-    /// Whether it is true or false, and no number.
+    /// True if the result is a truth value, not a number.
     #[must_use]
     pub const fn is_truth(self) -> bool {
         matches!(
@@ -118,6 +118,6 @@ impl Operation {
 pub struct Recorded {
     /// Operations, each on results of earlier ones.
     pub operations: Vec<Operation>,
-    /// Where the results stand.
+    /// Places of the results.
     pub results: Vec<Place>,
 }

@@ -27,15 +27,15 @@ pub enum Piece {
     /// The update with a reading (input) that has so much extra variance (input): out come the state, the innovation, its
     /// variance, the normalised innovation squared, and whether all of it is sound. With no phase the rate is split.
     Take(Option<Phase>),
-    /// Whether a state is sound. It stays.
+    /// Check that a state is sound. The state stays.
     Sound,
-    /// The rate drawn anew, of a mean (input) and a variance (input): out comes the state.
+    /// New rate, of a mean (input) and a variance (input): out comes the state.
     Renew,
-    /// What a rate on a side (input) may turn around: the excess of path, and its variance.
+    /// Path beyond the net move that a rate on a side (input) may add by turning around: the excess, and its variance.
     Turns,
-    /// Whether next to nothing of what a moving phase of a side (input) leads to is on that side.
+    /// True if next to no probability of a moving phase's prediction is on its side (input).
     Hopeless,
-    /// What a side (input) has of a rate that is certain to be there or not, and whether there is more to say.
+    /// Probability of a side (input) for a rate that is certain to be there or not, and whether a cut is needed.
     CertainOfSide,
     /// The state restricted to rates of a side (input), and what that leaves of it.
     CutOff,
@@ -46,7 +46,7 @@ pub enum Piece {
     Falling,
     /// The density of a standard normal at a border (input) over what it has above, and that.
     Tail,
-    /// Whether another state (inputs) says the same.
+    /// True if another state (inputs) is alike.
     Alike,
     /// The squared distance of another state (inputs) in strain and rate.
     Distance,
@@ -55,7 +55,7 @@ pub enum Piece {
 }
 
 impl Piece {
-    /// How many inputs stand between the state and the step.
+    /// Returns the number of inputs besides the state.
     #[must_use]
     pub const fn inputs(self, carried: Carried) -> usize {
         let another = carried.means + carried.covariances;
@@ -79,14 +79,14 @@ pub struct Carried {
     pub covariances: usize,
 }
 
-/// What a piece takes besides the state, and what takes it.
+/// Inputs of a piece besides the state, and the tape that records it.
 struct Inputs<'a, 't> {
     tape: &'t Tape,
     more: &'a [Expression<'t>],
 }
 
 impl<'t> Inputs<'_, 't> {
-    /// Of this number; a piece that has fewer does not ask for it.
+    /// Returns the input of this number; a piece that has fewer does not ask for it.
     fn at(&self, number: usize) -> Expression<'t> {
         self.more.get(number).copied().unwrap_or_else(|| self.tape.input(0).literal(0.0))
     }
@@ -111,7 +111,7 @@ impl<const B: usize, const N: usize, G: Curve<f32>> SparseEkf<f32, Compact, B, N
         open.write_down(piece)
     }
 
-    /// With a step of numbers that stand for inputs.
+    /// Records a piece with numbers that stand for inputs.
     fn write_down(&self, piece: Piece) -> Recorded {
         let tape = Tape::default();
         let carried = Self::carried();
@@ -124,7 +124,7 @@ impl<const B: usize, const N: usize, G: Curve<f32>> SparseEkf<f32, Compact, B, N
         tape.recorded(changed.into_iter().chain(results))
     }
 
-    /// What comes of a piece besides the state, which it changes.
+    /// Computes the results of a piece besides the state, which it changes.
     fn results_of<'t>(
         &self,
         piece: Piece,
@@ -204,7 +204,7 @@ fn clear() -> f32 {
 }
 
 impl Piece {
-    /// Whether the state is among what comes out.
+    /// True if the state is among the results.
     #[must_use]
     pub const fn changes_state(self) -> bool {
         matches!(

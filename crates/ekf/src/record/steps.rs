@@ -6,7 +6,7 @@ use ohmstrain_model::Scalar;
 use crate::Real;
 use crate::{Curve, Hypotheses, SignSplit, SparseEkf, Switch};
 
-/// What depends on the length of a step, as a list of numbers: what a filter goes on with for steps of another length.
+/// Values that depend on the length of a step, as a list of numbers: a filter needs them to go on with steps of another length.
 impl<T: Scalar, S, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, B, N, G> {
     /// The names of the numbers, of branch 0 as `b0_…`. One that begins with `b0_per_reach` is one over `b0_reach`.
     #[must_use]
@@ -34,7 +34,7 @@ impl<T: Scalar, S, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, 
         numbers
     }
 
-    /// Goes on with steps of `dt_s` seconds, for which these are the numbers.
+    /// Changes to steps of `dt_s` seconds, whose numbers are given.
     pub fn set_step(&mut self, dt_s: T, numbers: &[T]) {
         let mut numbers = numbers.iter();
         self.step.visit(&mut |_, _, number| *number = numbers.next().copied().unwrap_or(*number));
@@ -43,7 +43,7 @@ impl<T: Scalar, S, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, 
 }
 
 impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: Curve<T>> SignSplit<T, B, N, K, S, G> {
-    /// As [`SparseEkf::set_step`], with the probabilities of a change of phase, `[from][to]`.
+    /// See [`SparseEkf::set_step`]; takes also the probabilities of a change of phase, `[from][to]`.
     pub fn set_step(&mut self, dt_s: T, numbers: &[T], chain: [[T; 3]; 3]) {
         self.kernel.set_step(dt_s, numbers);
         self.chain = self.chain.map(|_| chain);
@@ -51,7 +51,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
 }
 
 impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: Curve<T>> Hypotheses<T, B, N, K, S, G> {
-    /// As [`SparseEkf::set_step`], with the probabilities of a change of phase, `[from][to]`.
+    /// See [`SparseEkf::set_step`]; takes also the probabilities of a change of phase, `[from][to]`.
     pub fn set_step(&mut self, dt_s: T, numbers: &[T], chain: [[T; 3]; 3]) {
         self.kernel.set_step(dt_s, numbers);
         self.chain = chain;

@@ -7,7 +7,7 @@ use super::operation::{Operation, Place};
 #[derive(Default)]
 pub(super) struct Tape {
     operations: RefCell<Vec<Operation>>,
-    /// What has been asked on this way, and what was answered; answers that are given before are taken in turn.
+    /// Questions asked on this way, and the answers; answers that were given before are taken in turn.
     asked: RefCell<Vec<Place>>,
     answers: RefCell<Vec<bool>>,
 }
@@ -23,7 +23,7 @@ impl Tape {
         place
     }
 
-    /// Which way to go: as answered before, and otherwise that of the truth.
+    /// Returns the answer that chooses the way: the one given before, and otherwise true.
     pub(super) fn ask(&self, operation: Operation) -> bool {
         let place = self.place(operation);
         let (mut asked, mut answers) = (self.asked.borrow_mut(), self.answers.borrow_mut());
@@ -43,7 +43,7 @@ impl Tape {
         *self.answers.borrow_mut() = answers.to_vec();
     }
 
-    /// What has been asked on this way.
+    /// Returns the questions asked on this way.
     pub(super) fn asked(&self) -> Vec<Place> {
         self.asked.borrow().clone()
     }
@@ -64,7 +64,7 @@ impl Tape {
         }
     }
 
-    /// Whether a truth is found without a division, a root or an exponential: such may be asked for where it does not matter.
+    /// True if a truth is found without a division, a root or an exponential: such a question costs little even where it does not matter.
     fn is_cheap(&self, place: Place) -> bool {
         let operation = self.operation(place);
         let is_dear = matches!(

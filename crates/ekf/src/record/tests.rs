@@ -1,4 +1,4 @@
-//! What is written down, done operation by operation, gives the bits of the kernel.
+//! Tests that recorded functions, run operation by operation, give the bits of the kernel.
 
 #![allow(clippy::unwrap_used, reason = "tests")]
 
@@ -15,7 +15,7 @@ use crate::{Belief, Compact, Evidence, Gaussian, Reading, SparseEkf};
 type Filter = SparseEkf<f32, Compact, 2, 5>;
 type State = Belief<f32, 5, 15>;
 
-/// Does what is written down: truths as 1 and 0.
+/// Runs the recorded operations: truths as 1 and 0.
 pub(super) fn run(recorded: &Recorded, inputs: &[f32]) -> Vec<f32> {
     let truth = |truth: bool| f32::from(u8::from(truth));
     let mut values: Vec<f32> = Vec::new();
@@ -151,7 +151,7 @@ fn what_is_written_down_is_what_the_kernel_does() {
     }
 }
 
-/// What hypotheses on a side of zero ask of a state.
+/// Compares the questions of hypotheses on a side of zero about a state.
 fn compare_side(filter: &Filter, state: &State, side: f32) {
     let (parts, clear) = (Parts::of(state), -2.0 * f32::EPSILON.ln());
     let truth = |truth: bool| f32::from(u8::from(truth));

@@ -7,24 +7,24 @@ use super::{Expression, Fields, Operation, Place, Recorded, See, Tape};
 /// A function that has been written down for all ways that it may go, with what it is given and what it gives by name.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Function {
-    /// What its inputs are called, by number.
+    /// Names of its inputs, by number.
     pub inputs: Vec<Name>,
-    /// What its results are called, in the order of what was recorded.
+    /// Names of its results, in the order of what was recorded.
     pub results: Vec<Name>,
-    /// What it does.
+    /// Recorded operations.
     pub recorded: Recorded,
 }
 
-/// What a number or a truth is called.
+/// Name of a number or a truth.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Name {
-    /// That of a state.
+    /// Name of a state's field.
     Field(String),
     /// One that is handed over, or given back.
     Own(String),
 }
 
-/// What a function is given and gives, while it is run for one of its ways.
+/// Writer of a function's inputs and results, while it is run for one of its ways.
 pub struct Writer<'t> {
     tape: &'t Tape,
     inputs: &'t core::cell::RefCell<Vec<Name>>,
@@ -48,7 +48,7 @@ impl<'t> Writer<'t> {
         self.tape.input(self.number_of(Name::Own(name.into())))
     }
 
-    /// As many numbers, handed over as a list.
+    /// Returns `K` input numbers, handed over as a list.
     #[must_use]
     pub fn inputs<const K: usize>(&self, name: &str) -> [Expression<'t>; K] {
         core::array::from_fn(|k| self.input(&format!("{name}[{k}]")))
@@ -67,7 +67,7 @@ impl<'t> Writer<'t> {
         state
     }
 
-    /// What has become of a state.
+    /// Writes the new state as results.
     pub fn keep<S: Fields<Expression<'t>>>(&mut self, mut state: S) {
         state.each(&mut Keep(self));
     }
@@ -83,7 +83,7 @@ impl<'t> Writer<'t> {
     }
 }
 
-/// What of numbers that may be missing says whether they are there.
+/// Name of the presence flag of an optional number.
 fn presence(name: &str) -> Name {
     Name::Field(format!("has_{name}"))
 }
@@ -205,7 +205,7 @@ mod tests {
     use crate::record::{Fields, See};
     use crate::{Gaussian, Reading};
 
-    /// Fields of a state in numbers: what is missing is told by none, truths are 1 and 0.
+    /// Fields of a state in numbers: a missing value has no entry, truths are 1 and 0.
     #[derive(Default)]
     struct Seen(HashMap<String, f32>);
 
@@ -240,7 +240,7 @@ mod tests {
         }
     }
 
-    /// Does what is written down with a state and inputs; the state after it, and what is given.
+    /// Runs a recorded function with a state and inputs; returns the new state, and the results.
     fn done(function: &Function, state: &HashMap<String, f32>, own: &[(&str, f32)]) -> [HashMap<String, f32>; 2] {
         let of = |name: &Name| match name {
             Name::Field(field) => state.get(field).copied().unwrap_or(f32::NAN),
@@ -257,7 +257,7 @@ mod tests {
         after
     }
 
-    /// Whether a state has these bits; what is missing may be anything.
+    /// Checks that a state has these bits; a missing number may be anything.
     fn assert_same(found: &HashMap<String, f32>, expected: &HashMap<String, f32>, row: usize) {
         for (name, number) in expected {
             assert_eq!(found[name].to_bits(), number.to_bits(), "row {row}, {name}: {} for {number}", found[name]);

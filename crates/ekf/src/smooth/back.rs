@@ -13,10 +13,10 @@ pub struct PastStep<S, P, T> {
     pub reading: Option<Reading<T>>,
 }
 
-/// Goes back through past steps, newest first, from the state after the newest. `visit` sees the state at the beginning
-/// of each step given all readings, and says whether to go on.
+/// Smooths back through past steps, newest first, from the state after the newest. `visit` gets the state at the beginning
+/// of each step given all readings, and returns true to go on.
 ///
-/// Nothing of the forward pass but the states is stored: each step is taken again, which gives the same. Returns whether
+/// Only the states of the forward pass are stored: each step is computed again, with the same result. Returns true if
 /// the estimator has a smoother.
 ///
 /// # Errors

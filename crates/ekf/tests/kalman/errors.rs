@@ -1,4 +1,4 @@
-//! What is refused, by name.
+//! Refused input, by name.
 
 use nalgebra::{Vector1, matrix, vector};
 use ohmstrain_ekf::kalman::{Filter, Kalman, KalmanError, NoMaximum, Normal, Ukf, maximise, smooth, smooth_first};

@@ -130,7 +130,7 @@ proptest! {
         }
     }
 
-    /// In whatever order readings arrive, as long as they are remembered.
+    /// Late readings give the same result in any order, as long as they are remembered.
     #[test]
     fn late_readings_are_as_good_as_punctual_ones(
         arrivals in prop::collection::vec((0.0..2.0_f64, -1.0..1.0_f64), 1..12),
@@ -158,7 +158,7 @@ proptest! {
     }
 }
 
-/// What is forgotten cannot be taken again; until then nothing is lost, the late reading itself being forgotten or not.
+/// Forgotten readings cannot be taken again; until then nothing is lost, whether the late reading itself is forgotten or not.
 #[test]
 fn a_full_memory_forgets_the_oldest() {
     let walk = |from_s: f64, to_s: f64| Kalman::new(matrix![1.0], matrix![to_s - from_s], matrix![1.0], matrix![0.5]);

@@ -12,7 +12,7 @@ use scopes::Scopes;
 /// The lines of a function; what is used once stands where it is used, and what only one way of a choice needs is done on that way.
 pub struct Body<'a> {
     operations: &'a [Operation],
-    /// How often each result is used.
+    /// Number of uses of each result.
     pub uses: Vec<usize>,
     scopes: Scopes,
     /// Its expression, once it has one, and how tightly that binds.
@@ -36,7 +36,7 @@ enum Binds {
 const LONGEST: usize = 84;
 
 impl<'a> Body<'a> {
-    /// Of what was recorded, its inputs named by `name_of`.
+    /// Prepares the body of a recorded function; `name_of` names its inputs.
     pub fn new(recorded: &'a Recorded, name_of: &'a dyn Fn(usize) -> String) -> Self {
         let operations = recorded.operations.as_slice();
         let uses = uses_of_needed(operations, &recorded.results);
@@ -206,7 +206,7 @@ fn hazard(tail: Place) -> String {
     format!("hazard{tail}")
 }
 
-/// How often each result is used by what leads to the results.
+/// Counts the uses of each result on the way to the results.
 pub fn uses_of_needed(operations: &[Operation], results: &[Place]) -> Vec<usize> {
     let mut uses = vec![0; operations.len()];
     results.iter().for_each(|place| uses[*place] += 1);

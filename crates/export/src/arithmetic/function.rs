@@ -9,7 +9,7 @@ use super::listed::{Lists, Slot, list};
 
 /// Name of a result that the function returns.
 pub const RETURNED: &str = "return";
-/// How results begin that are flags of what the function returns.
+/// Prefix of results that are flags in the function's return value.
 const FLAG: &str = "OHMSTRAIN_";
 
 /// A function in C, of what is kept of the readings.
@@ -22,7 +22,7 @@ pub struct Printed {
 }
 
 impl Printed {
-    /// Of what is done with a writer.
+    /// Records a function by running `done` with a writer.
     pub fn new(
         name: &'static str,
         comment: &'static str,
@@ -183,7 +183,7 @@ impl Printed {
     }
 }
 
-/// A function of this kind and name. What it does not use of its parameters is said: compilers warn of it.
+/// Returns a function of this kind and name. Unused parameters are marked: compilers warn of them.
 pub fn defined(comment: &str, name: &str, parameters: &[String], body: &str) -> String {
     let is_of_names = |c: char| c.is_alphanumeric() || c == '_';
     let name_of = |parameter: &String| {

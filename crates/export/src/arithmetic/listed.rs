@@ -49,7 +49,7 @@ const COPY: u8 = 2;
 const PICK: u8 = 22;
 const END: u8 = 255;
 
-/// Where an input comes from and a result is kept: two bits, and six for the place.
+/// Source of an input or place of a result: two bits, and six for the place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Slot {
     /// A number of the state.
@@ -74,7 +74,7 @@ impl Slot {
     }
 }
 
-/// What the lists of a program need of the loop.
+/// Requirements of a program's lists on the loop that runs them.
 #[derive(Debug, Default)]
 pub struct Lists {
     registers: usize,

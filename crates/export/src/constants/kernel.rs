@@ -46,7 +46,7 @@ pub struct SharedConstants {
 }
 
 impl SharedConstants {
-    /// The same for every sensor.
+    /// Returns the constants that are the same for every sensor.
     pub fn new() -> Self {
         Self {
             least_weight: Literal(shared::LEAST_WEIGHT_KEPT),
@@ -57,8 +57,8 @@ impl SharedConstants {
 }
 
 impl StepConstants {
-    /// Of a sensor, by the names that the kernel gives them.
-    /// What the filter does without is left out.
+    /// Returns the constants of a sensor, by the names that the kernel gives them.
+    /// Those that the filter does not need are left out.
     pub fn new<const B: usize, const N: usize>(sensor: &FixedRate<'_, B, N>, recorded: &Recorded) -> Self {
         let (table, names) = (&sensor.table, &recorded.names);
         let all: Vec<usize> = (0..table.rows[0].len()).collect();
@@ -93,14 +93,14 @@ pub struct Recorded {
     /// Functions in C.
     pub arithmetic: String,
     pub numbers: MixtureNumbers,
-    /// Of what depends on the length of a step, as C has them.
+    /// Names of the values that depend on the length of a step, as in C.
     pub names: Vec<String>,
     /// Places of those that the filter needs; `None` if it needs all, and the probabilities of a chain of phases after them.
     pub steps: Option<Vec<usize>>,
 }
 
 impl Recorded {
-    /// Of a sensor.
+    /// Records the kernel of a sensor.
     ///
     /// # Errors
     /// If the filter cannot work with its numbers.

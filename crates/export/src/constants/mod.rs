@@ -54,11 +54,11 @@ pub struct Exported {
     rests: bool,
     start_mean: Vec<Literal>,
     start_variance: Vec<Literal>,
-    /// Of a strain that is known at a start, and how far beyond the limits that may be.
+    /// Variance of a strain that is known at a start, and its tolerance beyond the limits.
     known_variance: Literal,
     known_beyond: Literal,
     reading_variance: Literal,
-    /// With what share of the weight a filter looks again.
+    /// Weight that the second hypothesis of a second look gets.
     beside_share: Literal,
     sieve: SieveConstants,
     doubt: DoubtConstants,
@@ -75,7 +75,7 @@ pub struct Exported {
     /// The kernel as functions in C, and what stands around it.
     arithmetic: String,
     around: String,
-    /// What the lists of operations take; `None` without lists.
+    /// Constants of the lists of operations; `None` without lists.
     lists: Option<ListConstants>,
     /// State from step to step, as C declares it.
     fields: Vec<String>,
@@ -107,21 +107,21 @@ impl ListConstants {
     }
 }
 
-/// How the filter is called.
+/// Names of the filter.
 #[derive(Debug, Serialize)]
 struct EstimatorText {
-    /// As a sentence begins, in prose, and on the command line.
+    /// Name at the beginning of a sentence, in prose, and on the command line.
     title: &'static str,
     prose: &'static str,
     name: &'static str,
     /// Its type in Rust.
     rust: String,
-    /// How many hypotheses it follows; 0 for a single Gaussian.
+    /// Number of hypotheses that it follows; 0 for a single Gaussian.
     hypotheses: usize,
 }
 
 impl Exported {
-    /// Checks that the sensor has an exported form and computes all of it. `plan` says what of its filter.
+    /// Checks that the sensor has an exported form and computes all of it. `plan` selects the filter and its parts.
     ///
     /// # Errors
     /// See [`ExportError`].

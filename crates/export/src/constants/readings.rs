@@ -17,7 +17,7 @@ pub struct SieveConstants {
     error_time_s: Option<Literal>,
 }
 
-/// When the interval is wider than the filter says.
+/// Constants of the doubts, which make an interval wider than the filter's own.
 #[derive(Debug, Serialize)]
 pub struct DoubtConstants {
     low: Literal,
@@ -55,7 +55,7 @@ struct UnreadConstants {
     anywhere: Literal,
 }
 
-/// Where the sensor rests.
+/// Constants of the sensor at rest.
 #[derive(Debug, Serialize)]
 struct RestConstants {
     rested: Literal,
@@ -65,7 +65,7 @@ struct RestConstants {
 }
 
 impl DoubtConstants {
-    /// Of a sensor; a strain below `zero` is none.
+    /// Converts those of a sensor; a strain below `zero` counts as zero.
     pub fn new(seen: &DoubtParts<f32>, zero: Literal) -> Self {
         Self {
             low: Literal(seen.low),
@@ -95,7 +95,7 @@ impl DoubtConstants {
 }
 
 impl FollowConstants {
-    /// Of a sensor.
+    /// Converts those of a sensor.
     pub fn new(bounds: RestBounds<f32>) -> Self {
         let start = bounds.start.map(|start| [Literal(start.reading), Literal(start.weight)]);
         Self { low: bounds.low.map(Literal), high: bounds.high.map(Literal), start }
@@ -103,7 +103,7 @@ impl FollowConstants {
 }
 
 impl SieveConstants {
-    /// Of a filter.
+    /// Converts those of a filter.
     pub fn new(sieve: &Sieve<f32>) -> Self {
         let finite = |number: f32| number.is_finite().then_some(Literal(number));
         Self {

@@ -51,7 +51,7 @@ fn twin(sensor: &Sensor, kind: EstimatorKind, rows: &[Row], protections: Protect
     of_computer(params, &parts, Replayed { rows, protections })
 }
 
-/// Does something with the twin in double precision, whose steps are those of a computer: lengths to a nanosecond, and pauses divided
+/// Runs a task with the twin in double precision, whose steps are those of a computer: lengths to a nanosecond, and pauses divided
 /// as where no table ends.
 fn of_computer<J: Task<f64>>(params: &SensorParams, parts: &ChipFilter, task: J) -> J::Said {
     let mut fixed = FixedRate::<2, 5>::new::<15>(params, parts, 0.05).unwrap();
@@ -95,7 +95,7 @@ fn library(filter: &mut Filter, rows: &[Row]) -> Vec<(f64, f64)> {
     rows.iter().map(row).collect()
 }
 
-/// Rested on another day, with another R₀: what the filter that is told so says, started at zero.
+/// Compares a twin that rested on another day, with another R₀, with the filter that is given that R₀ and starts at zero.
 #[test]
 fn a_twin_that_starts_again_at_zero_is_the_librarys_filter_that_starts_there() {
     let (sensor, another_day) = (sensor(), 1.08);
@@ -143,7 +143,7 @@ impl Task<f64> for ElsewhereAfter<'_> {
     }
 }
 
-/// Every filter that is exported, of both sensors.
+/// Returns every filter that is exported, of both sensors.
 fn filters() -> Vec<(Sensor, EstimatorKind)> {
     let of = |sensor: fn() -> Sensor, kinds: &[EstimatorKind]| {
         kinds.iter().map(|kind| (sensor(), *kind)).collect::<Vec<_>>()
@@ -198,7 +198,7 @@ fn faulty(mut rows: Vec<Row>) -> Vec<Row> {
     rows
 }
 
-/// With a protection turned off the twin is the library's filter without it, which is another one than with it.
+/// Compares twins with a protection turned off: the library's filter without it, which differs from the one with it.
 #[test]
 fn what_is_turned_off_is_off_in_both() {
     let sensor = sensor();

@@ -32,10 +32,10 @@ pub type Model = SwitchedModel<f32, BRANCHES, STATES>;
 {% if estimator.hypotheses %}
 /// Hypotheses that are followed at once.
 pub const HYPOTHESES: usize = << estimator.hypotheses >>;
-/// What moves the state.
+/// Filter that moves the state.
 pub type Estimator = << "SignSplit" if splits else "Hypotheses" >><f32, BRANCHES, STATES, HYPOTHESES, Compact>;
 {% else %}
-/// What moves the state.
+/// Filter that moves the state.
 pub type Estimator = SparseEkf<f32, Compact, BRANCHES, STATES>;
 {% endif %}
 /// Its filter, with all that stands around it.
@@ -46,9 +46,9 @@ pub const DT_S: f32 = << dt_s >>;
 /// Reading at zero << quantity >> after everything has relaxed, << reading_unit >>.
 pub const REST_READING: f32 = << rest_reading >>;
 {% if has_rested %}
-/// What the rested, unstretched sensor read in calibration: of the day, where [`REST_READING`] is of the law.
+/// Reading of the rested, unstretched sensor in calibration, as measured that day; [`REST_READING`] is fitted with the law.
 {% else %}
-/// What the rested, unstretched sensor would read by the law: in calibration it did not rest.
+/// Reading of the rested, unstretched sensor by the law: in calibration it did not rest.
 {% endif %}
 pub const RESTED: f32 = << rested >>;
 /// Range of the reported << quantity >>.
@@ -85,7 +85,7 @@ pub const LAW: SensorLaw<f32, BRANCHES> = SensorLaw {
     range: StrainRange { lower: << law.range_lower >>, upper: << law.range_upper >> },
 };
 
-/// What the law does not explain.
+/// Part of the reading that the law does not explain.
 pub const NOISE: ModelNoise<f32> = ModelNoise {
     reading_sd: << noise.reading_sd >>,
     branch_sd: << noise.branch_sd >>,
@@ -111,7 +111,7 @@ pub const SPEED_PER_S: f32 = << phases.speed_per_s >>;
 pub const TEMPERING: f32 = << phases.tempering >>;
 
 {% endif %}
-/// What a reading must be.
+/// Plausibility limits on a reading.
 pub const SIEVE: Sieve<f32> = Sieve {
     plausible: (<< sieve.lower >>, << sieve.upper >>),
     longest_repeat_s: {% if sieve.longest_repeat_s is none %}f32::INFINITY{% else %}<< sieve.longest_repeat_s >>{% endif %},
@@ -121,7 +121,7 @@ pub const SIEVE: Sieve<f32> = Sieve {
     error_time_s: {% if sieve.error_time_s is none %}0.0{% else %}<< sieve.error_time_s >>{% endif %},
 };
 
-/// When intervals are wider than the filter says.
+/// Doubts that widen intervals.
 pub const DOUBT: DoubtParts<f32> = DoubtParts {
     low: << doubt.low >>,
     high: << doubt.high >>,
@@ -216,7 +216,7 @@ pub const FEATURES: FeatureScale<f32> = FeatureScale {
     starts: [{% for start in correction.starts %}[<< start|join(", ") >>]{% if not loop.last %}, {% endif %}{% endfor %}],
 };
 
-/// What corrects the strain.
+/// Correction of the strain, with its quadratic functions.
 pub const LEARNED: Learned<'static, f32> = Learned {
     correction: CORRECTION,
 {% if correction.quadratics %}
@@ -234,7 +234,7 @@ pub const LEARNED: Learned<'static, f32> = Learned {
 {% endif %}
 };
 
-/// What was learned in calibration.
+/// Correction that was learned in calibration.
 pub const CORRECTION: Correction<'static, f32, FILTER_INPUTS> = Correction {
     rows: Rows::new(&ROWS, << correction.rows.count >>),
     scales: &SCALES,

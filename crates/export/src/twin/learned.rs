@@ -14,12 +14,12 @@ use crate::quadratic::OwnedQuadratic;
 pub struct OwnedLearned<T: Real> {
     features: FeatureScale<T>,
     rows: OwnedCorrection<T, FILTER_INPUTS>,
-    /// Of the direct process and of the residual one.
+    /// Quadratics of the direct process and of the residual one.
     quadratics: Option<[OwnedQuadratic<T>; 2]>,
 }
 
 impl<T: Real> OwnedLearned<T> {
-    /// In the precision of the program, with its limits.
+    /// Converts a correction to the precision of the program, with its limits.
     pub fn new(
         correction: &PortableCorrection,
         quadratics: Option<&[OwnedQuadratic; 2]>,
@@ -32,7 +32,7 @@ impl<T: Real> OwnedLearned<T> {
         Self { features, rows, quadratics: quadratics.map(|both| both.each_ref().map(narrow)) }
     }
 
-    /// As a live filter borrows it.
+    /// Borrows it in the form that a live filter takes.
     pub fn learned(&self) -> (FeatureScale<T>, Learned<'_, T>) {
         let quadratics = self.quadratics.as_ref().map(|both| both.each_ref().map(OwnedQuadratic::borrowed));
         (self.features, Learned { correction: self.rows.correction(), quadratics })

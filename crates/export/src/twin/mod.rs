@@ -24,7 +24,7 @@ const CHAIN: usize = 9;
 
 /// A filter whose steps can be made of given numbers.
 pub trait StepNumbers<T>: Copy {
-    /// Goes on with steps of another length, for which these are the numbers.
+    /// Changes the length of steps to `step_s`, whose numbers are given.
     fn set_numbers(&mut self, step_s: T, numbers: &[T], chain: [[T; 3]; 3]);
 }
 
@@ -52,12 +52,12 @@ pub struct Twin<'a, T, F> {
     /// Most hypotheses that it keeps.
     hypotheses: usize,
     numbers: Numbers<'a, T>,
-    /// How many hypotheses have been moved on, with a reading and without.
+    /// Numbers of hypotheses that have been propagated, with a reading and without.
     work: [Cell<usize>; 2],
 }
 
 impl<T, F> Twin<'_, T, F> {
-    /// How many hypotheses have been moved on, with a reading and without: what a filter's instructions are due to.
+    /// Returns the numbers of hypotheses that have been propagated, with a reading and without: they determine a filter's instructions.
     pub fn work(&self) -> [usize; 2] {
         self.work.each_ref().map(Cell::get)
     }
@@ -118,7 +118,7 @@ pub trait Task<T: Real> {
     /// Its result.
     type Said;
 
-    /// Does it.
+    /// Runs the task.
     ///
     /// # Errors
     /// If the filter refuses a step.
@@ -127,7 +127,7 @@ pub trait Task<T: Real> {
         F: SensorEstimator<T, N, L, Prepared = F> + StepNumbers<T>;
 }
 
-/// Does something with the twin of a sensor, in the precision of a model.
+/// Runs a task with the twin of a sensor, in the precision of a model.
 ///
 /// # Errors
 /// If the filter cannot work with its numbers, or refuses a step.
@@ -177,7 +177,7 @@ impl<T: Real, J: Task<T>, const B: usize, const S: usize> Of<'_, '_, T, J, B, S>
     }
 }
 
-/// Why a filter refuses a step of its own vectors.
+/// Converts the refusal of a step of the filter's own vectors to an error.
 pub fn refused(error: StepError) -> ExportError {
     ExportError::Parameter(format!("the filter refuses the law's own readings: {error}"))
 }

@@ -30,7 +30,7 @@ pub fn bits(flags: Flags) -> u32 {
 #[derive(Clone, Copy)]
 pub struct Parts<'a> {
     pub kind: EstimatorKind,
-    /// How long phases last, and whether the body rests; `None` for a filter without phases.
+    /// Durations of phases, and of rests if the body rests; `None` for a filter without phases.
     pub phases: Option<PhaseParams>,
     /// Surroundings of the filter. The lengths of its steps are those of single precision.
     pub live: LiveParts<f64, ()>,

@@ -7,7 +7,7 @@ use ohmstrain_calib::Lag;
 use crate::{CalibrationDoubt, LagDoubt};
 use crate::{Quiet, ReferenceDoubt, StartDoubt, UnitDoubt, UnitGuess, UnusedKnown};
 
-/// Where somebody uses a sensor, which is where doubts are answered.
+/// Interface through which a sensor is used, and doubts are answered.
 ///
 /// ```
 /// let quiet = ohmstrain::Quiet { from_s: 12.0, now_s: 42.1, strain: 0.031 };
@@ -15,9 +15,9 @@ use crate::{Quiet, ReferenceDoubt, StartDoubt, UnitDoubt, UnitGuess, UnusedKnown
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interface {
-    /// By flags.
+    /// Command line, answered by flags.
     CommandLine,
-    /// By arguments.
+    /// Python, answered by arguments.
     Python,
 }
 
@@ -178,7 +178,7 @@ impl CalibrationDoubt {
     }
 }
 
-/// What becomes of a reference that is not on the clock of the readings, and what is said of it; see [`LagDoubt::answer`].
+/// Decision about a reference that is not on the clock of the readings, with its sentence; see [`LagDoubt::answer`].
 ///
 /// ```
 /// use ohmstrain::{Interface, LagAnswer, LagDoubt};
@@ -189,19 +189,19 @@ impl CalibrationDoubt {
 #[cfg(feature = "calibrate")]
 #[derive(Clone, Debug, PartialEq)]
 pub enum LagAnswer {
-    /// It is moved, as somebody wants it to be.
+    /// The reference is moved, as requested.
     Move(Lag, String),
-    /// It is not calibrated on.
+    /// The reference is not calibrated on.
     Refuse(String),
-    /// It stays as it is, which may be wrong.
+    /// The reference stays, which may be wrong.
     Warn(String),
-    /// It stays as it is, which is right.
+    /// The reference stays, which is right.
     Remark(String),
 }
 
 #[cfg(feature = "calibrate")]
 impl LagDoubt {
-    /// What becomes of the reference, `align` being whether it is moved if it can be.
+    /// Returns the decision about the reference; `align` is true if it is to be moved if possible.
     ///
     /// ```
     /// use ohmstrain::{Interface, LagAnswer, LagDoubt};

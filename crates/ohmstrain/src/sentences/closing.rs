@@ -1,4 +1,4 @@
-//! What a calibration came to, in words.
+//! Summary of a calibration, in words.
 
 use ohmstrain_sensor::{Findings, Limit, Quantity, Scores, Seen, SensorParams, TestedSummary};
 use serde::Serialize;
@@ -13,7 +13,7 @@ const SELDOM: f64 = 0.04;
 /// One speed has quartiles, and a highest percentile, that differ by noise alone: up to this factor.
 const ONE_SPEED: f64 = 1.1;
 
-/// What a calibration came to, for people.
+/// Summary of a calibration, for people.
 ///
 /// ```
 /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -30,13 +30,13 @@ pub struct Closing<'a> {
     pub file: Option<&'a str>,
     /// The sensor.
     pub params: &'a SensorParams,
-    /// What it is worth; `None` if that could not be told.
+    /// Measured quality of the sensor; `None` if it could not be measured.
     pub findings: Option<&'a Findings>,
-    /// What it is worth on rows that it never saw; `None` if there were none.
+    /// Quality on held-out rows; `None` if there were none.
     pub tested: Option<&'a Tested>,
-    /// Wall-clock time, s, where somebody has looked at the clock.
+    /// Wall-clock time, s, if it was measured.
     pub calibration_s: Option<f64>,
-    /// Where the advice stands that is not printed.
+    /// Name of the place where the full advice is.
     pub more: &'a str,
 }
 
@@ -72,7 +72,7 @@ impl From<&Tested> for Known {
 }
 
 impl Closing<'_> {
-    /// What the sensor is worth on rows that it was not fitted to, in a sentence; `None` if there are none.
+    /// Returns a sentence on the sensor's quality on held-out rows; `None` if there are none.
     ///
     /// ```
     /// fn print(closing: &ohmstrain::Closing) {
@@ -85,7 +85,7 @@ impl Closing<'_> {
         (!known.is_empty()).then(|| verdict(&known))
     }
 
-    /// Whether its errors are below the static cubic's, wherever they are known, by more than chance makes them; `None` if none are.
+    /// True if its errors, wherever they are known, are below the static cubic's by more than chance; `None` if none are known.
     ///
     /// ```
     /// fn warn(closing: &ohmstrain::Closing) {
@@ -104,7 +104,7 @@ impl Closing<'_> {
         left_out.into_iter().chain(self.tested.map(Known::from)).collect()
     }
 
-    /// What a report says of the calibration: names and texts.
+    /// Returns the facts about the calibration for a report: names and texts.
     ///
     /// ```
     /// fn print(closing: &ohmstrain::Closing) {
@@ -124,7 +124,7 @@ impl Closing<'_> {
         [("Left out", error_and_coverage(found))].into_iter().chain(tested).chain(facts).collect()
     }
 
-    /// What a program prints at the end: names and sentences, seven at most.
+    /// Returns the lines that a program prints at the end: names and sentences, seven at most.
     ///
     /// ```
     /// fn print(closing: &ohmstrain::Closing) {
@@ -216,7 +216,7 @@ fn seen(seen: &Seen, quantity: Quantity) -> String {
     )
 }
 
-/// What makes the error: shares of it, the largest first. One line of a terminal.
+/// Returns the sources of the error: shares of it, the largest first. One line of a terminal.
 fn limited_by(found: &Findings) -> String {
     let whole = |share: f64| fixed(100.0 * share, 0);
     let share = |(limit, share): (Limit, f64)| format!("{} {} %", limit.name(), whole(share));

@@ -1,5 +1,5 @@
-//! What people read of a sensor, in sentences and numbers: what a calibration came to, what is doubted and what answers it. Command
-//! line, Python and report say these; how long a line is and where one ends is theirs.
+//! Sentences and numbers about a sensor for people: the summary of a calibration, doubts and the answers to them. Command
+//! line, Python and report use the same ones; the length of lines and their breaks are their own.
 
 mod answers;
 #[cfg(feature = "calibrate")]

@@ -87,7 +87,7 @@ pub fn fixed(value: f64, decimals: i32) -> String {
     signed(if is_zero { text.replace('-', "") } else { text })
 }
 
-/// Whether a number of this size is better written with a power of ten.
+/// True if a number of this size is better written with a power of ten.
 ///
 /// ```
 /// assert_eq!([1e-6, 0.1, 1e8].map(ohmstrain::number::reads_better_in_powers), [true, false, true]);

@@ -9,11 +9,11 @@ const CLEARLY_BETTER: f64 = 0.5;
 const BETTER: f64 = 0.9;
 /// Coverages of 95 % intervals that are taken for right.
 const COVERED: f64 = 0.9;
-/// Mean width of 95 % intervals, in percent of full scale, that says little: the standard deviation of a constant guess in
-/// the middle of an evenly used range gives 113.
+/// Mean width of 95 % intervals, in percent of full scale, above which they carry little information: the standard deviation of a
+/// constant guess in the middle of an evenly used range gives 113.
 const WIDE: f64 = 60.0;
 
-/// What is known of an estimate on some rows; errors in percent of full scale. Of a calibrated sensor what it keeps says it.
+/// Scores of an estimate on some rows; errors in percent of full scale. For a calibrated sensor they come from its summary.
 ///
 /// ```
 /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -35,7 +35,7 @@ pub struct Known {
 }
 
 impl Known {
-    /// From scores, and those of the static cubic on the same rows.
+    /// Creates it from scores, and those of the static cubic on the same rows.
     ///
     /// ```
     /// use ohmstrain::verdict::{Known, is_better};
@@ -76,7 +76,7 @@ fn worst_ratio(known: &[Known]) -> Option<f64> {
     ratios.max_by(f64::total_cmp)
 }
 
-/// Whether all errors are below the static cubic's, by more than chance makes them; `None` without one.
+/// True if all errors are below the static cubic's, by more than chance; `None` without one.
 ///
 /// ```
 /// assert_eq!(ohmstrain::verdict::is_better(&[]), None);
@@ -86,7 +86,7 @@ pub fn is_better(known: &[Known]) -> Option<bool> {
     Some(worst_ratio(known)? < BETTER)
 }
 
-/// What errors and their intervals are worth, in one sentence: the worst of what is known.
+/// Returns one sentence on the errors and their intervals, by the worst of the scores.
 ///
 /// ```
 /// assert_eq!(ohmstrain::verdict::verdict(&[]), "No static curve to compare with; its error bars hold.");
@@ -153,7 +153,7 @@ mod tests {
         assert_eq!(verdict(&[part(0.2, 0.01), part(0.03, 0.03)]), worst);
     }
 
-    /// By numbers, whatever the sentence says.
+    /// A sensor that is not better is shown by its errors, whatever the sentence.
     #[test]
     fn what_is_not_better_is_told_by_its_errors() {
         let part = |error: f64| Known::new(&scores(error, 0.1), Some(&scores(0.1, 1.0)));

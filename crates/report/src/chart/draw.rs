@@ -39,7 +39,7 @@ impl Chart {
         ))
     }
 
-    /// Left, top, width and height of the plot without its labels, in drawing units.
+    /// Returns the area of the plot without its labels, in drawing units: left, top, width and height.
     fn area_units(&self) -> String {
         let (width, height) = self.area_px();
         [LEFT_PX, ABOVE_PX, width, height].map(|px| fine(px).to_string()).join(" ")

@@ -12,11 +12,11 @@ pub const FUTURE_FEATURES: usize = FEATURES - 1;
 pub struct CorrectionParams {
     /// The filter that it corrects.
     pub corrects: EstimatorKind,
-    /// How it sees readings.
+    /// Scale of the readings.
     pub readings: CorrectionScale,
-    /// For the filter.
+    /// Correction of the filter.
     pub filter: CorrectorParams,
-    /// For the smoother.
+    /// Correction of the smoother.
     pub smoother: CorrectorParams,
     /// Process of simulated motions, which the sensor was not seen in, for the filter.
     pub simulated: SimulatedParams,
@@ -50,11 +50,11 @@ pub struct CorrectionScale {
     pub half_range: f64,
     /// Usual sizes of the readings' two rates.
     pub rates: [f64; 2],
-    /// Where low-passes usually are at a reading y, a + b y: where they start at the first one.
+    /// Usual values of the low-passes at a reading y, a + b y: their starting values at the first reading.
     pub starts: Starts<f64>,
 }
 
-/// How one of the two estimates is corrected.
+/// Parameters of the correction of one of the two estimates.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CorrectorParams {
@@ -64,7 +64,7 @@ pub struct CorrectorParams {
     pub strain_sd: f64,
     /// Indices of [`CorrectionParams::rows`], inducing rows first.
     pub order: Vec<usize>,
-    /// Where the inputs lie in the rows that it was learned from.
+    /// Scales of the inputs over the rows that it was learned from.
     pub inputs: InputScales,
     /// Strain from the features of the readings.
     pub direct: ProcessParams,
@@ -113,15 +113,15 @@ pub const SMOOTHER_INPUTS: usize = FILTER_INPUTS + FUTURE_FEATURES;
 pub const SIDES: usize = 2;
 
 impl CorrectionScale {
-    /// For the past.
+    /// Returns the scale for features of the past.
     #[must_use]
     pub const fn past(self) -> FeatureScale<f64> {
         let Self { centre, half_range, rates, starts } = self;
         FeatureScale { centre, half_range, rates, starts }
     }
 
-    /// For the future, whose low-passes start settled on the last reading: starts of their own made smoothers surer of other
-    /// motions than they may be.
+    /// Returns the scale for features of the future. Their low-passes start settled on the last reading: with fitted starts smoothers
+    /// were too sure of other motions.
     #[must_use]
     pub fn future(self) -> FeatureScale<f64> {
         FeatureScale { starts: settled(), ..self.past() }

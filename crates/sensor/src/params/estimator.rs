@@ -26,7 +26,7 @@ pub enum EstimatorKind {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[error("the sensor file has no parameters for `{0}`; calibrate with `{0}` as the estimator", kind.name())]
 pub struct NoParameters {
-    /// Which.
+    /// Kind of estimator.
     pub kind: EstimatorKind,
 }
 
@@ -75,17 +75,17 @@ pub struct EstimatorParams {
     /// Factor on the filter's standard deviation of strain, from how its 95 % interval covered the calibration, every
     /// block with the law that had not seen it.
     pub strain_sd_scale: f64,
-    /// The same for the smoother, where there is one.
+    /// Factor for the smoother, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub smoothed_sd_scale: Option<f64>,
-    /// How the body moves.
+    /// Parameters of the body's motion.
     pub motion: MotionParams,
     /// Noise: what the law does not explain.
     pub noise: NoiseParams,
-    /// How phases follow each other, for estimators that keep phase hypotheses.
+    /// Durations and order of phases, for estimators that keep phase hypotheses.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub phases: Option<PhaseParams>,
-    /// How readings go on where the strain is held; `None` if calibration has not seen holds.
+    /// Relaxation of the readings while the strain is held; `None` if calibration has not seen holds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub settling: Option<SettlingParams>,
 }
@@ -105,7 +105,7 @@ pub struct SettlingParams {
 }
 
 impl SettlingParams {
-    /// As estimates have it.
+    /// Converts it to the form that estimates use.
     #[must_use]
     pub const fn to_model(self) -> Settling<f64> {
         let Self { horizon_s, share, share_sd, sd } = self;
@@ -113,7 +113,7 @@ impl SettlingParams {
     }
 }
 
-/// How phases follow each other.
+/// Durations and order of phases.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PhaseParams {
@@ -130,7 +130,7 @@ pub struct PhaseParams {
 }
 
 impl PhaseParams {
-    /// How long phases last and what follows them.
+    /// Returns the durations of phases and the phases that follow.
     ///
     /// # Errors
     /// If a number is out of its range.
@@ -164,7 +164,7 @@ pub struct NoiseParams {
 }
 
 impl NoiseParams {
-    /// As the model has it, for a reading on its own.
+    /// Converts it to the model's noise, for a reading on its own.
     #[must_use]
     pub const fn to_model(self) -> ModelNoise<f64> {
         ModelNoise {
@@ -175,7 +175,7 @@ impl NoiseParams {
         }
     }
 
-    /// As the model has it, for readings every `dt_s` seconds.
+    /// Converts it to the model's noise, for readings every `dt_s` seconds.
     #[must_use]
     pub fn every(self, dt_s: f64) -> ModelNoise<f64> {
         let reading_sd = self.reading_sd / news(dt_s, self.reading_time_s).sqrt();
@@ -183,7 +183,7 @@ impl NoiseParams {
     }
 }
 
-/// How the body moves: an Ornstein-Uhlenbeck velocity, by standard deviations of strain and rate.
+/// Parameters of the body's motion: an Ornstein-Uhlenbeck velocity, by standard deviations of strain and rate.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(into = "MotionTable", from = "MotionTable")]
 pub struct MotionParams {
@@ -219,7 +219,7 @@ impl From<MotionTable> for MotionParams {
 }
 
 impl MotionParams {
-    /// As the model has it.
+    /// Converts it to the model's motion.
     ///
     /// # Errors
     /// Names the parameter that no motion can have.

@@ -58,7 +58,7 @@ pub struct Seen {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ErrorBudget {
-    /// Of the law's form and parameters, percent of the readings' range.
+    /// Error of the law's form and parameters, percent of the readings' range.
     pub law_percent: f64,
     /// Offset of whole parts, percent of the readings' range.
     pub drift_percent: f64,
@@ -70,7 +70,7 @@ pub struct ErrorBudget {
     pub wrong_error: f64,
 }
 
-/// How good estimates are against a known strain.
+/// Scores of estimates against a known strain.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scores {
@@ -78,7 +78,7 @@ pub struct Scores {
     pub n: usize,
     /// Root mean squared error, in the unit of strain.
     pub rmse: f64,
-    /// The same in percent of full scale: the reference's range in the rows scored.
+    /// Root mean squared error in percent of full scale: the reference's range in the rows scored.
     pub rmse_percent_fs: f64,
     /// Mean absolute error, in the unit of strain.
     pub mae: f64,
@@ -86,13 +86,13 @@ pub struct Scores {
     pub bias: f64,
     /// Share of rows whose 50 % interval holds the truth; empty for estimates without a deviation.
     pub coverage_50: Option<f64>,
-    /// The same for 90 %.
+    /// Share of rows whose 90 % interval holds the truth.
     pub coverage_90: Option<f64>,
-    /// The same for 95 %.
+    /// Share of rows whose 95 % interval holds the truth.
     pub coverage_95: Option<f64>,
     /// Mean width of the 95 % interval, in the unit of strain: what the coverage was bought with.
     pub width_95: Option<f64>,
-    /// The same in percent of full scale.
+    /// Mean width of the 95 % interval in percent of full scale.
     pub width_95_percent_fs: Option<f64>,
     /// Mean continuous ranked probability score, in the unit of strain: of a normal distribution with the estimate as its
     /// mean, as reported (within the limits), and its deviation. Less is better, whether an error is too large or an
@@ -100,7 +100,7 @@ pub struct Scores {
     ///
     /// Source: Gneiting & Raftery, *J. Am. Stat. Assoc.* 102 (2007) 359, eq. 21.
     pub crps: f64,
-    /// The same in percent of full scale.
+    /// Mean continuous ranked probability score in percent of full scale.
     pub crps_percent_fs: f64,
     /// Mean log density of the truth, strain in units of full scale; a reference is given a deviation of 0.5 % of it.
     pub log_score: Option<f64>,
@@ -111,18 +111,18 @@ pub struct Scores {
 /// Parts of a filter's squared error, each 0 to 1; together they are 1.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ErrorShares {
-    /// Of the law's form and parameters.
+    /// Share of the law's form and parameters.
     pub law: f64,
-    /// Of rows in which the direction is wrong.
+    /// Share of rows in which the direction is wrong.
     pub direction: f64,
-    /// Of slow changes.
+    /// Share of slow changes.
     pub drift: f64,
-    /// Of single readings' noise.
+    /// Share of single readings' noise.
     pub noise: f64,
 }
 
 impl ErrorShares {
-    /// With their names, the largest first.
+    /// Returns the shares with their names, the largest first.
     #[must_use]
     pub fn sorted(&self) -> [(Limit, f64); 4] {
         let mut parts = [
@@ -137,8 +137,8 @@ impl ErrorShares {
 }
 
 impl ErrorBudget {
-    /// Where the squared error of the strain lies: in rows where the direction is wrong; and of the other rows as law, drift
-    /// and noise share the square of what the law leaves of the readings.
+    /// Returns the shares of the squared error of the strain: of the rows where the direction is wrong; and of the other rows, divided
+    /// among law, drift and noise by the squares of their contributions to the readings.
     #[must_use]
     pub fn shares(&self) -> ErrorShares {
         let squares = [self.law_percent, self.drift_percent, self.noise_percent].map(|percent| percent * percent);

@@ -51,7 +51,7 @@ pub enum GaugeParams {
 }
 
 impl GaugeParams {
-    /// As the model has it.
+    /// Converts it to the model's gauge.
     #[must_use]
     pub const fn to_model(self) -> Gauge<f64> {
         match self {
@@ -129,7 +129,7 @@ impl LawParams {
         all
     }
 
-    /// As the model has it; `None` unless there are exactly `B` branches.
+    /// Converts it to the model's law; `None` unless there are exactly `B` branches.
     #[must_use]
     pub fn to_model<const B: usize>(&self) -> Option<SensorLaw<f64, B>> {
         let branches: Vec<Branch<f64>> = self

@@ -6,19 +6,19 @@ use crate::params::estimator::MotionParams;
 use crate::params::repeating::Repeating;
 use crate::params::{SensorParams, Sessions};
 
-/// By what factor a reading may lie outside of the calibration's, and by how many ranges of them above: another day, drift
-/// and strains that were not calibrated for do not double a resistance; a bad contact or a meter's overload does. No limit is set
-/// to the step from one reading to the next: a filter that takes surprising readings with less weight does as well without one
-/// against spikes, and better against what lasts, which such a limit has to let in after a while.
+/// Factor by which a reading may lie outside of the calibration's, and number of their ranges above them: another day, drift
+/// and strains that were not calibrated for do not double a resistance; a bad contact or a meter's overload does. The step
+/// from one reading to the next has no limit: a filter that downweights surprising readings does as well without one
+/// against spikes, and better against lasting changes, which such a limit has to let in after a while.
 const OUTSIDE: f64 = 2.0;
 /// Share of calibration's range of readings by which they have jumped.
 const JUMP: f64 = 0.08;
 /// A number that has come again for so many times the longest repetition in calibration is stuck.
 const LONGER: f64 = 3.0;
 
-/// By what share a rested sensor may read something else than in calibration: half of what is to be noticed, a tenth.
+/// Relative tolerance of the rested sensor's reading around that in calibration: half of a change worth noticing, a tenth.
 const TOLERANCE: f64 = 0.05;
-/// For how long readings must stay where they are to say something of R₀, s: twice as long as a doubt of a start lasts.
+/// Time for which readings must stay in place to count as evidence about R₀, s: twice as long as a doubt of a start lasts.
 const LASTS_S: f64 = 10.0;
 /// Share of the range of readings within which the reading at rest counts as one of its ends.
 const AT_END: f64 = 0.25;

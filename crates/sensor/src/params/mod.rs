@@ -23,13 +23,13 @@ use crate::params::range::RangeParams;
 use crate::params::static_cubic::StaticCubic;
 use crate::params::summary::{Summary, TestedSummary};
 
-/// Largest factor on the deviations of a calibrated filter. One beyond it says that something else is wrong: calibrations say so
-/// where they reach it.
+/// Largest factor on the deviations of a calibrated filter. A larger one is a sign of another error: calibrations report when
+/// they reach it.
 pub const LARGEST_SD_SCALE: f64 = 5.0;
 /// Version of the parameter file this code reads and writes.
 pub const FORMAT: u32 = 9;
 
-/// Everything a filter needs to know of a sensor: the content of `sensor.toml`.
+/// Parameters of a sensor, all that a filter needs: the content of `sensor.toml`.
 ///
 /// Strains stand for the reference quantity; with [`Quantity::AngleDeg`] they are degrees.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -49,7 +49,7 @@ pub struct SensorParams {
     /// at rest. A resistance measured at rest is compared with this one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub measured_rest: Option<f64>,
-    /// The estimator to use unless another is asked for.
+    /// Default estimator.
     pub default_estimator: EstimatorKind,
     /// Summary of the calibration; `None` if nothing could be scored on parts left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -251,8 +251,8 @@ impl SensorParams {
         }
     }
 
-    /// Whose intervals were widened as far as they ever are, [`LARGEST_SD_SCALE`](crate::LARGEST_SD_SCALE), when the blocks
-    /// left out may ask for more: the default estimator's, or those of the filter that it corrects, `filter` or `smoother`.
+    /// Returns the names of those whose intervals were widened by the maximum, [`LARGEST_SD_SCALE`](crate::LARGEST_SD_SCALE), though the
+    /// held-out blocks may ask for more: of the default estimator, or of the filter that it corrects, `filter` or `smoother`.
     #[must_use]
     pub fn widened_most(&self) -> Vec<&'static str> {
         let of = |kind: EstimatorKind| self.estimators.get(&self.filter_of(kind));

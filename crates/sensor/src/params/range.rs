@@ -12,7 +12,7 @@ pub struct RangeParams {
 }
 
 impl RangeParams {
-    /// As the model has it.
+    /// Converts it to the model's range.
     #[must_use]
     pub const fn to_model(self) -> StrainRange<f64> {
         StrainRange { lower: self.lower, upper: self.upper }

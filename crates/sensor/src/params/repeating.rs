@@ -4,7 +4,7 @@ use crate::params::Resolution;
 
 /// Probability that a still sensor repeats one number as often as a stuck one.
 const FALSE_ALARM: f64 = 1e-6;
-/// From this many deviations of the noise on, a step is coarse: a still sensor may give one number for ever.
+/// Number of the noise's standard deviations from which on a step is coarse: a still sensor may give one number for ever.
 const COARSE: f64 = 4.0;
 
 /// Repetition of one number by a still sensor, from the step of its readings and their noise.
@@ -12,18 +12,18 @@ const COARSE: f64 = 4.0;
 pub(super) struct Repeating {
     /// True where the step is coarse: no repetition is a fault.
     pub is_endless: bool,
-    /// How often a number comes again at most.
+    /// Largest number of repetitions.
     pub most: f64,
     /// Variance of a converter's error, (R/R₀)², above which its step is coarse.
     pub fine_variance: f64,
 }
 
 impl Repeating {
-    /// Of files that say nothing of step and noise: ten repetitions, and no converter is coarse.
+    /// Repetition for files without step and noise: ten repetitions, and no converter is coarse.
     pub(super) const UNKNOWN: Self = Self { is_endless: false, most: MOST_REPEATS as f64, fine_variance: 1.0 };
 
-    /// Of readings over a rest resistance. The noise is Gaussian, the resistance in the middle of a step, where one number
-    /// comes most often.
+    /// Computes the repetition of readings over a rest resistance. The noise is Gaussian, the resistance in the middle of a step, where
+    /// one number comes most often.
     pub(super) fn new(resolution: Resolution, rest_reading: f64) -> Self {
         let Resolution { step, noise_sd } = resolution;
         let coarse = COARSE * noise_sd;
@@ -61,7 +61,7 @@ mod tests {
         longest
     }
 
-    /// In 20 000 rows a number comes again as often with a probability of two per cent, and half as often almost surely.
+    /// Tests a still sensor: in 20 000 rows a number repeats that often with a probability of two per cent, and half as often almost surely.
     #[test]
     fn a_still_sensor_is_not_stuck() {
         for step_in_sds in [1.0, 1.5, 2.0] {

@@ -38,7 +38,7 @@ pub struct TestedSummary {
 pub enum Limit {
     /// The form of the law.
     Law,
-    /// Which way the body moves.
+    /// Wrong direction of the body's motion.
     Direction,
     /// Slow changes that strain does not explain.
     Drift,
@@ -47,7 +47,7 @@ pub enum Limit {
 }
 
 impl Limit {
-    /// In a word.
+    /// Returns its name, in a word.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {

@@ -1,7 +1,7 @@
 //! The range of every number in a sensor's parameters, in one place.
 //!
-//! A file that is edited by hand, or was damaged, is refused with the name of the number; it never becomes a filter that
-//! says something else than what it means.
+//! A file that is edited by hand, or was damaged, is refused with the name of the number; it never becomes a filter with
+//! wrong estimates.
 
 mod correction;
 pub mod table;
@@ -21,9 +21,9 @@ use crate::params::{JointParams, RecordingInfo, Resolution, SensorParams, Sessio
 
 /// Shortest range of strains, relative to its larger end.
 const SHORTEST_RANGE: f64 = 1e-9;
-/// How many times the largest reading of the calibration, or the smallest, R₀ may be.
+/// Largest ratio between R₀ and the calibration's largest or smallest reading.
 const REST_BEYOND: f64 = 100.0;
-/// How far beyond the limits the mean strain may lie, in spans.
+/// Largest distance of the mean strain beyond the limits, in spans.
 const MEAN_BEYOND: f64 = 10.0;
 /// Strains at which that is looked at.
 const GAUGE_POINTS: u32 = 64;
@@ -182,7 +182,7 @@ impl LawParams {
 }
 
 impl GaugeParams {
-    /// Every number by itself, and what they make of the strains of the law.
+    /// Checks every number by itself, and then the gauge over the strains of the law.
     fn validate(&self, table: &Table, range: RangeParams) -> Result<(), FieldError> {
         match self {
             Self::Polynomial { coefficients } => table.numbers("coefficients", coefficients, SIGNED)?,

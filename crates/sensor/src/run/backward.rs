@@ -17,19 +17,19 @@ pub(crate) enum Row<E: Estimator<f64, N, L>, const N: usize, const L: usize> {
 
 /// The way back over rows, newest first. It leads from reading to reading; a row without one branches off from the reading after it.
 pub(crate) struct Backward<S> {
-    /// At the last reading before the rows that have been gone over, or whole steps after it, given all readings.
+    /// State at the last reading before the rows that have been passed, or whole steps after it, given all readings.
     smoothed: S,
     /// The reading after that: its time, s, as it was used, and the state there.
     ahead: Option<(f64, Option<Reading<f64>>, S)>,
 }
 
 impl<S: Clone> Backward<S> {
-    /// From where the filter is after the last row.
+    /// Starts from the filter's state after the last row.
     pub(crate) fn new(last: S) -> Self {
         Self { smoothed: last, ahead: None }
     }
 
-    /// Goes over a row and shows its state, given all readings; to the row before it only if `is_to_go_on`. Returns whether the
+    /// Passes a row and shows its state, given all readings; goes on to the row before it only if `is_to_go_on`. Returns true if the
     /// estimator has a smoother.
     pub(crate) fn over<E, const N: usize, const L: usize>(
         &mut self,

@@ -74,10 +74,10 @@ fn needed(learned: Option<&Arc<Learned>>, kind: EstimatorKind) -> Result<Option<
     Ok(Some(learned.ok_or(NoParameters { kind })?))
 }
 
-/// All that a filter is made of but its correction.
+/// Parts of a filter without its correction.
 #[derive(Clone, Copy)]
 pub struct FilterParts<'a> {
-    /// Never [`EstimatorKind::Corrected`].
+    /// Kind of filter, never [`EstimatorKind::Corrected`].
     kind: EstimatorKind,
     law: &'a LawParams,
     estimator: EstimatorParams,
@@ -86,7 +86,7 @@ pub struct FilterParts<'a> {
 }
 
 impl<'a> FilterParts<'a> {
-    /// Of a calibrated sensor.
+    /// Collects the parts of a calibrated sensor's filter.
     fn of(params: &'a SensorParams, kind: EstimatorKind, options: Options) -> Result<Self, SensorError> {
         params.validate()?;
         let kind = params.filter_of(kind);
@@ -94,12 +94,12 @@ impl<'a> FilterParts<'a> {
         Ok(Self { kind, law: &params.law, estimator, parts: params.live_parts(&estimator), options })
     }
 
-    /// Of a law that is being calibrated: nothing is known of how the sensor is read.
+    /// Collects the parts of a filter for a law that is being calibrated: nothing is known about the readings yet.
     pub fn of_law(kind: EstimatorKind, law: &'a LawParams, estimator: EstimatorParams, limits: RangeParams) -> Self {
         Self { kind, law, estimator, parts: bare_parts(&estimator, limits), options: Options::plain() }
     }
 
-    /// The same with other options.
+    /// Sets other options.
     #[cfg(test)]
     pub(crate) fn with(self, options: Options) -> Self {
         Self { options, ..self }

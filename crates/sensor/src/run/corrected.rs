@@ -11,7 +11,7 @@ use crate::run::{Output, Rows, SEGMENT, WayBack};
 
 /// A smoother on its way back, corrected segment by segment. Everything but the strain is the smoother's.
 ///
-/// Where a reading is missing the correction holds what it has seen last, and its variance grows by as much as the smoother's
+/// At a missing reading the correction keeps its last features, and its variance grows by as much as the smoother's
 /// has grown since.
 pub(crate) struct CorrectedWayBack<'a> {
     back: Box<dyn WayBack + 'a>,
@@ -60,13 +60,13 @@ struct Seen {
 }
 
 impl Seen {
-    /// As it was read.
+    /// Returns the reading as it was read.
     fn plain(reading: Option<Reading<f64>>) -> Self {
         let finite = |reading: Reading<f64>| Some(reading.value).filter(|value| value.is_finite());
         Self { reading: reading.and_then(finite), surprises: false }
     }
 
-    /// As the filter has taken it: nothing, if it was kept from it.
+    /// Returns the reading as the filter has taken it: none if it was rejected.
     fn new(output: &Output, reading: Option<Reading<f64>>) -> Self {
         let is_weighed_down = output.verdict == ReadingVerdict::Downweighted;
         let surprises = is_weighed_down && output.nis.is_some_and(|nis| nis > SURPRISING_NIS);
@@ -98,7 +98,7 @@ impl<'a> CorrectedWayBack<'a> {
         Self { back, correction, rows, starts, ahead: Watched::new(learned.future_scale()) }
     }
 
-    /// After the last reading the future is as at the last reading: settled.
+    /// Corrects a smoothed row; after the last reading the future is as at the last reading: settled.
     fn correct(&self, output: &Output, past: &[f64; FEATURES], future: Option<[f64; FEATURES]>) -> Gaussian<f64> {
         let future = future.map_or([0.0; FUTURE_FEATURES], future_features);
         let inputs = smoother_inputs(&outputs(output), past, &future);

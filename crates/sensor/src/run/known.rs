@@ -7,9 +7,9 @@ use serde::{Deserialize, Serialize};
 
 /// Known strains that count for a row: the last ones of a filter, half before and half after a smoother's row.
 pub const MOST_KNOWN: usize = 16;
-/// For how long errors hang together that come and go with the motion, s.
+/// Correlation time of errors that come and go with the motion, s.
 const FAST_S: f64 = 3.0;
-/// For how long offset and gain of a day do, s.
+/// Correlation time of a day's offset and gain, s.
 const SLOW_S: f64 = 3600.0;
 /// Variance of the error of the gain, relative to that of the offset, for a strain that may be anywhere in the limits: a
 /// strain that is known near one end of them tells little of the other one.
@@ -17,11 +17,11 @@ const GAIN: f64 = 1.0;
 /// Beyond this distance from the middle of the limits, in spans, an error of the gain grows no more.
 const FARTHEST: f64 = 0.6;
 
-/// How large errors are that last, in stated variances: within a recording hardly anything, on another day many times what
-/// is stated. Which of them it is the known strains tell.
+/// Size of lasting errors, in stated variances: within a recording next to nothing, on another day many times what
+/// is stated. The known strains tell which one applies.
 #[derive(Clone, Copy, Debug)]
 struct Size {
-    /// How probable it is before any strain is known.
+    /// Probability before any strain is known.
     probability: f64,
     fast: f64,
     slow: f64,
@@ -38,11 +38,11 @@ const SIZES: [Size; 4] = [
 /// A strain that was known at a moment, and what had been stated of it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct KnownStrain {
-    /// When, s.
+    /// Time, s.
     pub time_s: f64,
     /// The strain, and how well it is known.
     pub known: Gaussian<f64>,
-    /// The statement, without what earlier known strains say of it.
+    /// Estimate of the strain, without the effect of earlier known strains.
     pub said: Gaussian<f64>,
 }
 
@@ -82,7 +82,7 @@ struct Place {
 }
 
 impl Size {
-    /// Of errors at two places, where `usual` is the variance that the slow part is relative to.
+    /// Returns the covariance of errors at two places; `usual` is the variance that the slow part is relative to.
     fn covariance(self, usual: f64, a: Place, b: Place) -> f64 {
         let apart_s = (a.time_s - b.time_s).abs();
         let fast = self.fast * a.sd * b.sd * (-apart_s / FAST_S).exp();
@@ -91,13 +91,13 @@ impl Size {
 }
 
 impl KnownErrors {
-    /// Before any strain is known.
+    /// Starts before any strain is known.
     #[must_use]
     pub const fn new(limits: StrainRange<f64>) -> Self {
         Self { limits, strains: VecDeque::new(), usual: 0.0, voices: Vec::new() }
     }
 
-    /// Of so many strains, the last [`MOST_KNOWN`] of them.
+    /// Conditions the errors on known strains, the last [`MOST_KNOWN`] of them.
     #[must_use]
     pub fn of(limits: StrainRange<f64>, strains: &[KnownStrain]) -> Self {
         let last = strains.len().saturating_sub(MOST_KNOWN);
@@ -115,7 +115,7 @@ impl KnownErrors {
         self.condition();
     }
 
-    /// Something else is stated of the strain at a time than when it was told, as after a lag.
+    /// Restates the estimate of the strain at a known time, which has changed since, for example after a lag.
     pub fn restate(&mut self, time_s: f64, said: Gaussian<f64>) {
         let mut is_new = false;
         for strain in self.strains.iter_mut().filter(|strain| strain.time_s == time_s) {
@@ -266,7 +266,7 @@ mod tests {
         }
     }
 
-    /// Told one after another, forgetting the oldest, or all at once.
+    /// Tests that only the last strains count, whether they are given one after another or all at once.
     #[test]
     fn the_last_ones_count() {
         let strains: Vec<_> = (0..40).map(|k| strain(20.0 * f64::from(k), 0.2, 0.2 + 0.001 * f64::from(k))).collect();

@@ -21,13 +21,13 @@ pub(crate) type OfFilter = OwnedCorrection<f64, FILTER_INPUTS>;
 pub(crate) type OfSmoother = OwnedCorrection<f64, SMOOTHER_INPUTS, SIDES>;
 
 impl Learned {
-    /// Of a sensor's correction; `None` if it has none.
+    /// Prepares a sensor's correction; `None` if it has none.
     #[must_use]
     pub fn of(params: &SensorParams) -> Option<Arc<Self>> {
         params.correction.as_ref().map(|correction| Self::new(correction, params.limits))
     }
 
-    /// Of parameters, and the limits of the strain.
+    /// Prepares a correction from parameters and the limits of the strain.
     #[must_use]
     pub fn new(params: &CorrectionParams, limits: RangeParams) -> Arc<Self> {
         let of_filter: Vec<_> = params.rows.iter().map(TrainingRow::filter_inputs).collect();

@@ -1,4 +1,4 @@
-//! Any filter behind one trait: what the kernels of `ohmstrain-ekf` become once a sensor says which of them it needs.
+//! Filters behind one trait: the kernels of `ohmstrain-ekf` in the instances that a sensor needs.
 
 mod backward;
 pub(crate) mod build;
@@ -39,7 +39,7 @@ pub trait Filter: Send {
     /// Strain at the last row, within the limits.
     fn strain(&self) -> Gaussian<f64>;
 
-    /// Everything that is reported of the last row.
+    /// Returns all that is reported about the last row.
     fn output(&self) -> Output;
 
     /// Like [`Self::step`], but every row is estimated from the readings up to `lag_s` seconds after it; `out` gets the
@@ -61,13 +61,13 @@ pub trait Filter: Send {
     /// See [`StepError`].
     fn flush_lagged(&mut self, out: &mut dyn FnMut(Output)) -> Result<(), StepError>;
 
-    /// All that the next row depends on but the parameters and options that the filter was made of.
+    /// Stores all that the next row depends on, except the parameters and options that the filter was made of.
     ///
     /// # Errors
     /// If TOML cannot hold it.
     fn store(&self) -> Result<toml::Table, toml::ser::Error>;
 
-    /// Goes on from what [`Self::store`] gave, of a filter made of the same parameters and options, to the bit.
+    /// Resumes, to the bit, from the result of [`Self::store`], of a filter made of the same parameters and options.
     ///
     /// # Errors
     /// If it is the state of a filter of another kind. The filter stays as it was.
@@ -123,7 +123,7 @@ impl<'a> Rows<'a> {
         Self { len, row }
     }
 
-    /// How many.
+    /// Returns the number of rows.
     #[must_use]
     pub const fn len(&self) -> usize {
         self.len
@@ -142,7 +142,7 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// Goes back through a recording. What it holds in memory are the states of one segment, and a state for each of those
+/// Way back through a recording. It holds in memory the states of one segment, and a state for each of those
 /// before it.
 pub trait WayBack {
     /// Smooths the last segment that has not been smoothed yet. `out` then holds its estimates in order of time; what is
@@ -168,12 +168,12 @@ pub struct Output {
     pub reading: Option<Reading<f64>>,
     /// Flags that doubts raise.
     pub doubts: Flags,
-    /// By what share R₀ has been followed.
+    /// Relative deviation of R₀, as the filter follows it, from calibration's.
     pub rest_off: f64,
 }
 
 impl Output {
-    /// Widens what is said of the strain, `stated` before doubts, to a variance, and by as much, on the mean slope, what is said of
+    /// Widens the estimate of the strain, `stated` before doubts, to a variance, and by as much, on the mean slope, the prediction of
     /// the reading after a hold.
     pub fn widen(&mut self, doubts: &Doubts<f64>, stated: Gaussian<f64>, variance: f64) {
         self.estimate.still_relaxes.variance += doubts.of_reading(variance - stated.variance).max(0.0);
@@ -181,7 +181,7 @@ impl Output {
     }
 }
 
-/// Where a filter starts.
+/// Starting strain of a filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Start {
     /// The long-run distribution of the calibration.

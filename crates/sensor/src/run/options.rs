@@ -15,7 +15,7 @@ pub struct Options {
 }
 
 impl Options {
-    /// From an unknown strain, unprotected.
+    /// Returns the options of a filter from an unknown strain, without protections.
     #[must_use]
     pub fn plain() -> Self {
         Self { start: Start::Unknown, guard: Guard::none(), protections: Protections::NONE }

@@ -13,9 +13,9 @@ use crate::run::learned::Learned;
 /// A sensor's filter, with what stands around it.
 #[derive(Clone, Debug)]
 pub struct PortableFilter {
-    /// Which filter moves the state: never [`EstimatorKind::Corrected`].
+    /// Filter that moves the state: never [`EstimatorKind::Corrected`].
     pub kind: EstimatorKind,
-    /// How many hypotheses it keeps: 1 if it keeps none.
+    /// Number of hypotheses that it keeps; 1 if it keeps none.
     pub hypotheses: usize,
     /// Its noise, motion and phases.
     pub estimator: EstimatorParams,
@@ -30,12 +30,12 @@ pub struct PortableFilter {
 pub struct PortableCorrection {
     /// The scale of the features.
     pub features: FeatureScale<f64>,
-    /// As it runs.
+    /// Correction in the form that runs.
     pub learned: OwnedCorrection<f64, FILTER_INPUTS>,
 }
 
 impl PortableFilter {
-    /// Of the sensor's default estimator, or of another one.
+    /// Collects the filter of the sensor's default estimator, or of another one.
     ///
     /// # Errors
     /// If a number is out of its range, or the sensor has no parameters for the estimator.

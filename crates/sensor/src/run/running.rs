@@ -52,7 +52,7 @@ pub(crate) struct Running<E: SensorEstimator<f64, N, L>, const B: usize, const N
     due: Vec<Output>,
 }
 
-/// From states to what is reported.
+/// Conversion from states to reported estimates.
 #[derive(Clone, Copy)]
 pub(crate) struct Reports<const B: usize, const N: usize> {
     pub model: SwitchedModel<f64, B, N>,
@@ -106,7 +106,7 @@ impl<E, const B: usize, const N: usize, const L: usize> Running<E, B, N, L>
 where
     E: SensorEstimator<f64, N, L>,
 {
-    /// Before any row.
+    /// Starts before any row.
     pub(crate) fn new(
         estimator: E,
         parts: LiveParts<f64, SharedCorrection>,
@@ -163,7 +163,7 @@ where
         self.reports.row(state, heard, self.reports.smoothed_scale)
     }
 
-    /// Says the strain in doubt, unless nothing is to be doubted.
+    /// Widens the strain's interval by the doubts, if there are any.
     fn widen(&self, output: &mut Output, doubts: &Doubts<f64>, stated: Gaussian<f64>, (variance, flags): (f64, Flags)) {
         if self.reports.doubts {
             output.widen(doubts, stated, variance);
@@ -173,8 +173,8 @@ where
         }
     }
 
-    /// The report of a row given later readings: mixed with what was said when it came where that is corrected, and in the
-    /// doubts of then.
+    /// Returns the output of a row given later readings: mixed with its first estimate if there is a correction, and with the
+    /// doubts of that time.
     fn lagged_row(&self, state: &E::State, said: &Said) -> Output {
         let scale = self.reports.filtered_scale.max(self.reports.smoothed_scale);
         let mut output = self.reports.row(state, &said.heard, scale);

@@ -11,7 +11,7 @@ use crate::run::clock::Clock;
 use crate::run::remembering::Remembering;
 use crate::run::running::{LiveStep, Pending, Said};
 
-/// All that the next row depends on, `S` the estimator's state. What is prepared of steps is not in it: it follows from
+/// State that the next row depends on, `S` the estimator's state. Prepared steps are not in it: they follow from
 /// their lengths.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -14,7 +14,7 @@ use crate::run::{Output, Rows, SEGMENT, Smoother, WayBack};
 pub(crate) struct Segments<'a, E: SensorEstimator<f64, N, L>, const B: usize, const N: usize, const L: usize> {
     running: &'a mut Running<E, B, N, L>,
     rows: Rows<'a>,
-    /// Where the filter was before the first row of each segment that is not smoothed yet.
+    /// Filter's state before the first row of each segment that is not smoothed yet.
     starts: Vec<(Clock, Memory<f64, E::State>)>,
     /// The way back over those that are.
     back: Backward<E::State>,

@@ -3,7 +3,7 @@
 
 macro_rules! of_one {
     ($($number:ty: $($name:ident)*;)*) => { $($(
-        /// As its name says.
+        /// Implementation of the function of that name.
         #[unsafe(no_mangle)]
         pub extern "C" fn $name(x: $number) -> $number {
             libm::$name(x)
@@ -13,7 +13,7 @@ macro_rules! of_one {
 
 macro_rules! of_two {
     ($($number:ty: $($name:ident)*;)*) => { $($(
-        /// As its name says.
+        /// Implementation of the function of that name.
         #[unsafe(no_mangle)]
         pub extern "C" fn $name(x: $number, y: $number) -> $number {
             libm::$name(x, y)

@@ -1,4 +1,4 @@
-//! What was measured with one build.
+//! Figures that were measured with one build.
 
 use std::collections::BTreeMap;
 use std::error::Error;

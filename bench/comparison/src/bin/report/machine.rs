@@ -1,4 +1,4 @@
-//! Where and with what the figures were measured.
+//! Machine and tools with which the figures were measured.
 
 use std::error::Error;
 use std::process::Command;

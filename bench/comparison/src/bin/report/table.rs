@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use crate::figures::Build;
 
-/// What a ratio should be.
+/// Target of a ratio.
 enum Target {
     AtMost(f64),
     AtLeast(f64),
@@ -48,7 +48,7 @@ pub fn targets(builds: &[Build]) -> String {
     ratios(&TARGETS, builds)
 }
 
-/// What `instructions.toml` says of a row of the sign-split filter.
+/// Returns the line of `instructions.toml` on the sign-split filter.
 pub fn instructions(budget: &str) -> Option<String> {
     let figure = budget.lines().find_map(|line| line.strip_prefix("sign_split_6 = "))?;
     let met = figure.parse::<f64>().ok()? <= 12_000.0;
@@ -58,7 +58,7 @@ pub fn instructions(budget: &str) -> Option<String> {
     ))
 }
 
-/// What the same filters take beside others that are given constant matrices.
+/// Returns the ratios of the same filters to others that are given constant matrices.
 pub fn beside_constants(builds: &[Build]) -> String {
     ratios(&BESIDE, builds)
 }

@@ -36,11 +36,11 @@ pub struct Budget {
     per_step: BTreeMap<String, f64>,
 }
 
-/// What a comparison says.
+/// Result of a comparison.
 pub struct Verdict {
-    /// Every figure beside its budget.
+    /// Table of every figure beside its budget.
     pub table: String,
-    /// What breaks the rule, in words.
+    /// Figures that break the rule, in words.
     pub broken: Vec<String>,
 }
 

@@ -12,7 +12,7 @@ use crate::import::error::{ImportError, quoted};
 /// Files that a question names.
 const MOST_NAMED: usize = 6;
 
-/// What is in an archive.
+/// Content of an archive.
 pub(crate) enum Packed {
     /// The contents of a file.
     File(Vec<u8>),

@@ -113,7 +113,7 @@ impl Cells {
         &self.text[start..end]
     }
 
-    /// Some of the cells, in this order.
+    /// Returns some of the cells, in this order.
     pub(crate) fn some(&self, rows: impl Iterator<Item = usize>) -> Self {
         let mut out = Self::default();
         for row in rows {

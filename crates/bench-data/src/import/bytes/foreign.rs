@@ -3,7 +3,7 @@
 /// A container: its name, what it begins with and where, and how it is converted.
 type Container = (&'static str, usize, &'static [u8], &'static str);
 
-/// What the Python package reads, with the package that it needs for it.
+/// Advice for a format that the Python package reads, with the package that it needs for it.
 macro_rules! of_python {
     ($package:literal) => {
         concat!(
@@ -89,7 +89,7 @@ const KNOWN: [Container; 34] = [
 const PICKLE: &str =
     "python3 -c \"import pandas; pandas.DataFrame(pandas.read_pickle('FILE')).to_csv('out.csv', index=False)\"";
 
-/// What a file is that is not read, and how to make one of it that is.
+/// Returns the name of a format that is not read, and a way to convert the file.
 pub(crate) fn refusal(bytes: &[u8], file: &str) -> Option<String> {
     let begins = |(_, place, magic, _): &&Container| bytes.get(*place..).is_some_and(|rest| rest.starts_with(magic));
     let (name, _, _, way) = KNOWN.iter().find(begins)?;

@@ -1,4 +1,4 @@
-//! Contents of a file: gzip unpacked, containers opened, text decoded. Nothing here asks for the meaning of a cell.
+//! Contents of a file: gzip unpacked, containers opened, text decoded. The meaning of cells is not considered here.
 
 mod archive;
 pub(crate) mod bounds;
@@ -65,9 +65,9 @@ pub(crate) fn open(mut bytes: Vec<u8>, name: &str, sheet: Option<&str>) -> Resul
     }
 }
 
-/// What a file in a zip archive is packed in.
+/// Prefix of the format of a file in a zip archive.
 const ZIP: &str = "zip, ";
-/// What a zip container begins with.
+/// First bytes of a zip container.
 const PK: &[u8] = b"PK\x03\x04";
 
 const NO_WORKBOOK: &str = "cannot be read as a workbook: expected records and places in a sheet, found others: save the sheet \
@@ -95,7 +95,7 @@ fn contents(bytes: Vec<u8>, name: &str, sheet: Option<&str>) -> Result<Contents,
     Ok(Contents::Text(text, encoding))
 }
 
-/// What a library reads of a container. They panic at some that are cut, and at places and sizes that cannot be.
+/// Calls a library that reads a container. Libraries panic at some containers that are cut, and at impossible places and sizes.
 fn guarded<T>(name: &str, expected: &str, read: impl FnOnce() -> Result<T, ImportError>) -> Result<T, ImportError> {
     catch_unwind(AssertUnwindSafe(read)).unwrap_or_else(|_| Err(ImportError::unreadable(name, expected)))
 }

@@ -3,7 +3,7 @@
 use crate::import::bytes::cell::{Cell, Cells};
 use crate::import::bytes::parquet::RawColumn;
 
-/// What such a file begins with.
+/// First bytes of such a file.
 pub(crate) const MAGIC: &[u8] = b"\x93NUMPY";
 /// Columns of an array; one with more of them is something else.
 const MOST_COLUMNS: usize = 1000;
@@ -62,7 +62,7 @@ fn header(bytes: &[u8]) -> Option<(&str, &[u8])> {
     Some((std::str::from_utf8(header).ok()?, data))
 }
 
-/// What stands behind a key of the header.
+/// Returns the text behind a key of the header.
 fn entry<'a>(header: &'a str, key: &str) -> Option<&'a str> {
     let (_, behind) = header.split_once(&format!("'{key}':"))?;
     Some(behind.trim_start())

@@ -6,7 +6,7 @@ use crate::import::bytes::cell::{Cell, Rows};
 /// Sheets of a workbook by their names.
 pub(crate) type NamedSheets = Vec<(String, Rows<'static>)>;
 
-/// What the sheets of a workbook may still hold.
+/// Cells and bytes that the sheets of a workbook may still hold.
 pub(crate) struct Budget {
     cells: usize,
     bytes: u64,
@@ -18,7 +18,7 @@ impl Default for Budget {
     }
 }
 
-/// Why a workbook is refused that holds too much.
+/// Reason for refusing a workbook that holds too much.
 pub(crate) type TooMuch = String;
 
 impl Budget {

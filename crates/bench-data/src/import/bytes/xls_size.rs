@@ -15,7 +15,7 @@ const SEVERAL: u16 = 0x00bd;
 const ROWS: u32 = 1 << 16;
 const COLUMNS: u32 = 1 << 8;
 
-/// Refuses a workbook whose sheets are larger than may be held, or say so.
+/// Refuses a workbook whose sheets are, or claim to be, too large.
 pub(crate) fn check(bytes: &[u8]) -> Result<(), TooMuch> {
     let Some(stream) = compound::stream(bytes, &["Workbook", "Book"])? else {
         return Err(
@@ -64,7 +64,7 @@ fn check_sheet(sheet: &[u8], budget: &mut Budget) -> Result<(), TooMuch> {
     budget.take(height * width, 0)
 }
 
-/// What a sheet says of its rows and columns is made room for before any cell is read.
+/// Checks the stated extent of a sheet, for which memory is allocated before any cell is read.
 fn check_extent(record: &Record) -> Result<(), TooMuch> {
     let long = (record.long(0), record.long(4), record.short(8), record.short(10));
     let short = (record.short(0), record.short(2), record.short(4), record.short(6));

@@ -1,5 +1,5 @@
-//! Looks into a zip container before anything in it is read: which kind of workbook it is, and how much it unpacks to. Rows
-//! and cells of ODS are repeated as often as a number says, and are counted.
+//! Inspection of a zip container before anything in it is read: the kind of workbook, and its unpacked size. Rows
+//! and cells of ODS with repetition counts are counted that many times.
 
 use std::io::{BufRead, BufReader, Cursor, Read, copy, sink};
 
@@ -18,7 +18,7 @@ pub(crate) enum Kind {
     Ods,
 }
 
-/// True if a container is no workbook, but files that somebody has packed together.
+/// True if a container is no workbook, but an archive of files.
 pub(crate) fn is_archive(bytes: &[u8]) -> bool {
     const OF_WORKBOOKS: [&str; 3] = ["content.xml", "xl/workbook.bin", "[Content_Types].xml"];
     let Ok(archive) = ZipArchive::new(Cursor::new(bytes)) else { return false };
@@ -71,7 +71,7 @@ struct Size {
     height: usize,
     width: usize,
     bytes: u64,
-    /// Where a cell stands in the last column.
+    /// Place of a cell in the last column.
     last: (u32, u32),
 }
 
@@ -83,7 +83,7 @@ struct Row {
     /// Columns up to the last cell that is not empty.
     width: usize,
     bytes: u64,
-    /// How often the cell is repeated that has begun.
+    /// Repetitions of the cell that has begun.
     cell: usize,
 }
 

@@ -7,7 +7,7 @@ use crate::import::roles::unit::channel;
 use crate::import::table::{Table, all_files};
 use crate::import::words::Role;
 
-/// The clock of a value's column: what the answers say, a rate, or a column of times in the same file. `role` is that of
+/// Finds the clock of a value's column: by the answers, by a rate, or by a column of times in the same file. `role` is that of
 /// its times.
 pub(crate) fn clock(
     found: &Found,
@@ -98,7 +98,7 @@ fn beside(columns: usize, times: &[&Candidate], column: usize) -> Option<usize> 
     }
 }
 
-/// Nothing says what the time is.
+/// Returns the question for an unknown time.
 fn no_time(found: &Found, file: usize, role: Role) -> ImportError {
     let (table, rising) = (&found.tables[file], found.rising(file));
     let mut answers = rising_answers(found, file, role, &rising);
@@ -131,7 +131,7 @@ fn rising_words(table: &Table, rising: &[usize]) -> String {
     }
 }
 
-/// Nothing says which column holds the readings.
+/// Returns the question for unknown readings.
 pub(crate) fn no_readings(found: &Found) -> ImportError {
     let tables = found.tables;
     let Some(table) = tables.first() else { return ImportError::unreadable("import", "expected a file, found none") };

@@ -46,7 +46,7 @@ pub(crate) fn decide(found: &Found, answers: &Recipe) -> Decision {
     decision
 }
 
-/// What is decided; what is not becomes a question, asked once.
+/// Returns the decision; an open question is added to the questions, once.
 fn known<T>(decided: Result<T, ImportError>, questions: &mut Vec<ImportError>) -> Option<T> {
     let question = match decided {
         Ok(known) => return Some(known),
@@ -107,7 +107,7 @@ fn missing_answers(found: &Found, answers: &Recipe, decision: &Decision) -> Vec<
     questions
 }
 
-/// True if the reference is a stretch ratio, and nobody has said what it is at rest.
+/// True if the reference is a stretch ratio, and its value at rest is unknown.
 pub(crate) fn is_stretch_without_zero(found: &Found, answers: &Recipe, decision: &Decision) -> bool {
     let is_stretch = |channel: &Channel| {
         channel.role == Role::Strain
@@ -130,7 +130,7 @@ fn incomplete_records(found: &Found, place: Place) -> Option<ImportError> {
     Some(ImportError::content(&table.file, first, Fault::new(expected, what)))
 }
 
-/// What there is to say where one of several references is taken since its name is that of the readings.
+/// Returns a remark if one of several references is chosen because it shares the readings' name.
 fn by_its_name(found: &Found, answers: &Recipe, reference: Place, readings: Place) -> Option<String> {
     let is_answered = Role::REFERENCES.iter().any(|role| answers.column(*role).is_some());
     let references = found.candidates.iter().filter(|one| one.is_named && Role::REFERENCES.contains(&one.role)).count();
@@ -139,7 +139,7 @@ fn by_its_name(found: &Found, answers: &Recipe, reference: Place, readings: Plac
     (references > 1 && !is_answered).then_some(remark)
 }
 
-/// What there is to say where no column is the reference, and nobody has said that none is.
+/// Returns a remark if no column is the reference, and the user has not said that there is none.
 fn no_reference(found: &Found, answers: &Recipe) -> Option<String> {
     if Role::REFERENCES.iter().any(|role| answers.column(*role).is_some()) {
         return None;

@@ -72,9 +72,9 @@ pub(crate) struct Decision {
     pub readings: Vec<Timed>,
     pub reference: Option<Timed>,
     pub temperature: Option<Channel>,
-    /// What follows from names or numbers, and is not said by an answer.
+    /// Conclusions from names or numbers that no answer stated.
     pub remarks: Vec<String>,
-    /// What nothing decides, the most important one first; without any, there are readings.
+    /// Open questions, the most important one first; without any, there are readings.
     pub questions: Vec<ImportError>,
 }
 

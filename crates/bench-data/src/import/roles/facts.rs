@@ -15,16 +15,16 @@ use crate::order::median;
 /// Cells that tell what a column without a name is.
 const FIRST_CELLS: usize = 5;
 
-/// What a column may be, by its name and unit.
+/// Possible role of a column, by its name and unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Candidate {
     /// The file, counted from 0.
     pub table: usize,
     /// The column, counted from 0.
     pub column: usize,
-    /// What it may be.
+    /// Possible role.
     pub role: Role,
-    /// True if the name says so, not the unit alone.
+    /// True if the role follows from the name, not from the unit alone.
     pub is_named: bool,
 }
 
@@ -39,9 +39,9 @@ impl Candidate {
 pub(crate) struct Found<'a> {
     /// Headings, units, layouts and metadata.
     pub tables: &'a [Table],
-    /// What is known of each column of each file, found out when it is first asked for.
+    /// Facts about each column of each file, found when they are first asked for.
     pub facts: Vec<Vec<OnceCell<Facts>>>,
-    /// What the columns may be.
+    /// Possible roles of the columns.
     pub candidates: Vec<Candidate>,
     /// A known layout that one of the files has.
     pub preset: Option<Preset>,
@@ -80,11 +80,11 @@ pub(crate) enum Dates {
     #[default]
     None,
     In(Order),
-    /// Day and month cannot be told apart.
+    /// A date whose day and month are ambiguous.
     Open,
 }
 
-/// Statistics of the numbers of a column; medians of none are NaN.
+/// Statistics of the numbers of a column; medians of an empty column are NaN.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Numbers {
     /// Median step from row to row.
@@ -135,7 +135,7 @@ impl Dates {
 }
 
 impl<'a> Found<'a> {
-    /// Looks at files.
+    /// Collects the facts about files.
     pub(crate) fn of(tables: &'a [Table]) -> Self {
         let facts = |table: &Table| vec![OnceCell::new(); table.columns.len()];
         Self {
@@ -158,7 +158,7 @@ impl<'a> Found<'a> {
         self.facts[place.file][place.column].get_or_init(|| Facts::of(self.table(place), place.column))
     }
 
-    /// How messages call a column.
+    /// Returns the name of a column in messages.
     pub(crate) fn name(&self, place: Place) -> String {
         self.table(place).name(place.column)
     }
@@ -193,7 +193,7 @@ pub fn candidates(tables: &[Table]) -> Vec<Candidate> {
     tables.iter().enumerate().flat_map(|(file, table)| among(file, &says(table))).collect()
 }
 
-/// The candidates in a file, by what its columns say. `R_1` beside `R` is another thing.
+/// Returns the candidates in a file, by its columns' names and units. `R_1` beside `R` is another thing.
 pub(crate) fn among(table: usize, says: &[Option<(Role, Sureness)>]) -> Vec<Candidate> {
     let is_strong = |role: Role| says.contains(&Some((role, Sureness::Strong)));
     let said = says.iter().enumerate().filter_map(|(column, said)| said.map(|(role, how)| (column, role, how)));
@@ -202,8 +202,8 @@ pub(crate) fn among(table: usize, says: &[Option<(Role, Sureness)>]) -> Vec<Cand
         .collect()
 }
 
-/// What a column's name and unit say, if it has a number or a date at all; a column of dates beside one of times of day is
-/// nothing. Without a name, times since 1970 and moments are the time.
+/// Returns the role that a column's name and unit suggest, if it has a number or a date at all; a column of dates beside one of times of
+/// day has none. Without a name, times since 1970 and moments are the time.
 fn says(table: &Table, place: usize) -> Option<(Role, Sureness)> {
     let (column, decimal) = (&table.columns[place], table.layout.decimal);
     let mut filled = column.cells.iter().filter(|cell| !cell.is_empty()).take(FIRST_CELLS).peekable();

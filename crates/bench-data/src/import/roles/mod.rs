@@ -1,4 +1,4 @@
-//! Which column is what: what was found in the files and what the user answered become a decision.
+//! Roles of columns: the contents of the files and the user's answers become a decision.
 
 mod clock;
 mod decide;

@@ -17,7 +17,7 @@ impl Preset {
     /// All of them.
     pub const ALL: [Self; 1] = [Self::ElectromechStretcher];
 
-    /// As flags name it.
+    /// Returns its name in flags.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {

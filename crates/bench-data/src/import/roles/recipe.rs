@@ -11,7 +11,7 @@ use crate::{FrontEndSpec, JointSpec};
 #[error("{0}")]
 pub struct RecipeError(String);
 
-/// What is said about a column by a flag: `Time (s)`, `3` or, where there are two files, `2:Position`.
+/// Column named by a flag: `Time (s)`, `3` or, with two files, `2:Position`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ColumnName {
     /// The file, counted from 1, if it is named.
@@ -28,7 +28,7 @@ impl ColumnName {
     }
 }
 
-/// What stands for no column.
+/// Name that stands for no column.
 pub(crate) const NO_COLUMN: &str = "none";
 
 impl fmt::Display for ColumnName {
@@ -92,12 +92,12 @@ where
     }
 }
 
-/// How the clock of the reference is brought to that of the readings.
+/// Alignment of the reference's clock with that of the readings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Align {
     /// They are one clock.
     None,
-    /// By the motion, which both files show.
+    /// Alignment by the motion, which both files show.
     Motion,
     /// The reference's clock plus so many seconds is the readings'.
     Seconds(f64),
@@ -126,12 +126,12 @@ impl FromStr for Align {
     }
 }
 
-/// What is said about files beforehand; what is not is found out or asked.
+/// Answers about files that are given in advance; the others are found out or asked.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Recipe {
     /// A known layout.
     pub preset: Option<Preset>,
-    /// Which columns are what.
+    /// Columns and their roles.
     pub columns: Vec<(Role, ColumnName)>,
     /// Units of columns.
     pub units: Vec<(Role, String)>,
@@ -143,7 +143,7 @@ pub struct Recipe {
     pub sheet: Option<String>,
     /// Rows that are wanted: those that pass all of these.
     pub rows: Vec<PerFile<RowFilter>>,
-    /// Which recording, counted from 1, of a file in which the clock begins anew.
+    /// Recording, counted from 1, of a file in which the clock restarts.
     pub recording: Option<usize>,
     /// Texts that stand for missing values.
     pub missing: Vec<String>,
@@ -151,11 +151,11 @@ pub struct Recipe {
     pub magnitude: Vec<Role>,
     /// Roles in which a lone 0 between larger values is a missing one.
     pub drop_zeros: Vec<Role>,
-    /// What columns read at rest, in their own units.
+    /// Values of columns at rest, in their own units.
     pub zero: Vec<(Role, f64)>,
     /// Neighbouring readings were taken with the current's sign changed: their means are the readings.
     pub fold_polarity: bool,
-    /// How two clocks come together.
+    /// Alignment of two clocks.
     pub align: Option<Align>,
     /// Rows per second where there is no time.
     pub rate_hz: Option<f64>,
@@ -168,7 +168,7 @@ pub struct Recipe {
 }
 
 impl Recipe {
-    /// What is said of how a file, counted from 0, is written.
+    /// Returns the options for reading a file, counted from 0.
     #[must_use]
     pub fn read_options(&self, file: usize) -> ReadOptions {
         ReadOptions {
@@ -179,7 +179,7 @@ impl Recipe {
         }
     }
 
-    /// The recipe with what its preset knows where it says nothing.
+    /// Returns the recipe completed by its preset.
     pub(crate) fn completed(&self) -> Self {
         let mut out = self.clone();
         let Some(preset) = self.preset else { return out };
@@ -199,7 +199,7 @@ impl Recipe {
         out
     }
 
-    /// The column that is said to have a role; `Some(None)` if there is to be none.
+    /// Returns the column that was given for a role; `Some(None)` if there is to be none.
     pub(crate) fn column(&self, role: Role) -> Option<Option<&ColumnName>> {
         let (_, name) = self.columns.iter().rev().find(|(of, _)| *of == role)?;
         Some(Some(name).filter(|name| !name.is_none()))
@@ -209,7 +209,7 @@ impl Recipe {
         self.units.iter().rev().find(|(of, _)| *of == role).map(|(_, unit)| unit.as_str())
     }
 
-    /// The flags that say it, each as one word of a command line, unquoted.
+    /// Returns the flags for it, each as one word of a command line, unquoted.
     #[must_use]
     pub fn arguments(&self) -> Vec<String> {
         let mut out = Vec::new();
@@ -240,7 +240,7 @@ impl Recipe {
     }
 }
 
-/// What is said last of a file, counted from 0.
+/// Returns the last value given for a file, counted from 0.
 fn for_file<T: Copy>(values: &[PerFile<T>], file: usize) -> Option<T> {
     values.iter().rev().find(|value| value.is_for(file)).map(|value| value.value)
 }

@@ -16,7 +16,7 @@ const SHORTEST_STEP_S: f64 = 1e-5;
 /// A resistance without a unit is taken for ohms from this on.
 const LEAST_OHM: f64 = 10.0;
 
-/// The channel of a column, its unit found or asked. What follows from the numbers is remarked.
+/// Finds the channel of a column; its unit is found, or becomes a question. Conclusions from the numbers become remarks.
 pub(crate) fn channel(
     found: &Found,
     answers: &Recipe,
@@ -29,13 +29,13 @@ pub(crate) fn channel(
     Ok(Channel { role, place, unit })
 }
 
-/// A column whose unit is asked.
+/// Column whose unit is in question.
 struct Asked<'a> {
     table: &'a Table,
     column: &'a Column,
     facts: &'a dyn Fn() -> &'a Facts,
     role: Role,
-    /// How messages call it.
+    /// Name in messages.
     name: String,
 }
 
@@ -98,7 +98,7 @@ impl Asked<'_> {
         ImportError::question(&self.table.file, what, of_scale.into_iter().chain(answers))
     }
 
-    /// What a line `# strain_unit = …` or `# resistance_unit = …` says, whatever the column is called.
+    /// Returns the unit of a line `# strain_unit = …` or `# resistance_unit = …`, whatever the column's name.
     fn by_metadata(&self) -> Option<Unit> {
         let metadata = &self.table.metadata;
         let name = match self.role {

@@ -17,7 +17,7 @@ pub(crate) use values::{Values, check_positive, converted};
 /// A gap of more typical steps is not bridged, unless the values on both sides are the same.
 const LONGEST_GAP: f64 = 10.0;
 
-/// Answers where the clock begins anew.
+/// Answers for a clock that restarts.
 const ANOTHER_RECORDING: [&str; 2] = [
     "--split-recordings if another recording begins here, for a file of each",
     "--recording 1 for the first of them alone",
@@ -125,8 +125,8 @@ pub(crate) fn spurious_zeros(values: &[f64], never_zero: bool) -> Vec<usize> {
     (0..values.len()).filter(|row| values[*row] == 0.0).filter(is_spurious).collect()
 }
 
-/// By how much neighbouring readings alternate, relative to their size, if they do: in most stretches of twenty, nearly
-/// every reading lies on the other side of its neighbours' mean than the one before. Noise does that in four of five.
+/// Returns the amplitude by which neighbouring readings alternate, relative to their size, if they do: in most stretches of twenty,
+/// nearly every reading lies on the other side of its neighbours' mean than the one before. Noise does that in four of five.
 pub(crate) fn alternation(values: &[f64]) -> Option<f64> {
     const STRETCH: usize = 20;
     const SHARE: f64 = 0.8;

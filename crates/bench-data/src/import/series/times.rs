@@ -21,7 +21,7 @@ pub(crate) struct Times {
     pub seconds: Vec<f64>,
     /// The first date or time of day, ns, and as it stands in the file.
     pub zero: Option<(i128, String)>,
-    /// How often a 32-bit counter started again.
+    /// Number of restarts of a 32-bit counter.
     pub wraps: usize,
 }
 

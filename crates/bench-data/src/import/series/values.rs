@@ -85,7 +85,7 @@ fn no_number(table: &Table, name: &str, row: usize, cell: &str) -> ImportError {
     ImportError::question(&format!("{}:{line}", table.file), what, [answer])
 }
 
-/// Refuses what is no resistance, with the flag that says what it is.
+/// Refuses values that are no resistance, and names the flag for their kind.
 pub(crate) fn check_positive(tables: &[Table], channel: &Channel, values: &[f64]) -> Result<(), ImportError> {
     let Some(row) = values.iter().position(|value| *value <= 0.0) else { return Ok(()) };
     let (table, column, role) = (&tables[channel.place.file], channel.place.column, channel.role);

@@ -27,7 +27,7 @@ impl Column {
     }
 }
 
-/// What is known of a file before it is read; what is not is found out.
+/// Properties of a file that are given in advance; the others are found out.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ReadOptions {
     /// The decimal mark.
@@ -40,14 +40,14 @@ pub struct ReadOptions {
     pub rows: Vec<RowFilter>,
 }
 
-/// How a file is written.
+/// Format of a file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Layout {
-    /// What kind of file, in words: `text`, `XLSX, sheet `…``, `Parquet`, after `gzip, ` if it was compressed.
+    /// Kind of file, in words: `text`, `XLSX, sheet `…``, `Parquet`, after `gzip, ` if it was compressed.
     pub format: String,
     /// Encoding of text.
     pub encoding: Option<&'static str>,
-    /// What separates the cells of text, in words.
+    /// Separator of the cells of text, in words.
     pub separator: Option<&'static str>,
     /// The decimal mark.
     pub decimal: DecimalMark,
@@ -80,11 +80,11 @@ pub struct Layout {
 /// A file's cells by column, and how they were written.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
-    /// What messages call the file.
+    /// Name of the file in messages.
     pub file: String,
-    /// How it is written.
+    /// Format of the file.
     pub layout: Layout,
-    /// What `# key = value` lines above the header say.
+    /// Metadata of the `# key = value` lines above the header.
     pub metadata: Metadata,
     /// The columns.
     pub columns: Vec<Column>,
@@ -105,7 +105,7 @@ impl Table {
         self.lines.is_empty()
     }
 
-    /// How messages call a column.
+    /// Returns the name of a column in messages.
     pub(crate) fn name(&self, column: usize) -> String {
         match self.columns.get(column) {
             Some(column) if !column.heading.is_empty() => quote(&column.heading),

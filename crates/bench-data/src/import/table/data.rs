@@ -39,7 +39,7 @@ impl Shape {
     }
 }
 
-/// What the lines of data have in common.
+/// Common properties of the lines of data.
 pub(crate) struct Data {
     pub shape: Shape,
     /// Their last cells are empty: a separator at the end.

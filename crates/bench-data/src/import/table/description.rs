@@ -2,7 +2,7 @@ use crate::counted::counted;
 use crate::import::table::Table;
 
 impl Table {
-    /// How it is written, in words.
+    /// Describes the format, in words.
     #[must_use]
     pub fn description(&self) -> String {
         let layout = &self.layout;

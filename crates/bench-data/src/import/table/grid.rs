@@ -14,7 +14,7 @@ pub(crate) const ARROW: &str = " -> ";
 /// The name of the clock that a serial monitor writes.
 pub(crate) const MONITOR_CLOCK: &str = "monitor clock";
 
-/// What separates the cells of a line.
+/// Separator of the cells of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Separator {
     Tab,
@@ -25,7 +25,7 @@ pub(crate) enum Separator {
 }
 
 impl Separator {
-    /// Those between cells; where two explain a file alike, the first.
+    /// Separators between cells; if two explain a file alike, the first counts.
     pub(crate) const CELLS: [Self; 5] = [Self::Tab, Self::Semicolon, Self::Comma, Self::Pipe, Self::Spaces];
 
     pub(crate) const fn words(self) -> &'static str {

@@ -16,7 +16,7 @@ const MOST_HEADER_LINES: usize = 3;
 pub(crate) struct Header {
     /// The first line of data, as an index of the grid.
     pub first_row: usize,
-    /// What most lines of data are.
+    /// Shape of most lines of data.
     pub shape: Shape,
     /// Heading of each column; empty where there is none.
     pub headings: Vec<String>,
@@ -28,14 +28,14 @@ pub(crate) struct Header {
     pub header_lines: usize,
     /// True if there is a line of units.
     pub unit_line: bool,
-    /// How many names there are, where that is another number than of columns.
+    /// Number of names, if it differs from that of columns.
     pub given_names: Option<usize>,
-    /// What `# key = value` lines say.
+    /// Metadata of the `# key = value` lines.
     pub metadata: Metadata,
 }
 
 impl Header {
-    /// Looks above the first line that is data, below `skip` physical lines.
+    /// Finds the header above the first line that is data, below `skip` physical lines.
     pub(crate) fn find(file: &str, grid: &Grid, decimal: DecimalMark, skip: usize) -> Result<Self, ImportError> {
         let first = (0..grid.len()).find(|row| grid.line(*row) > skip as u64).unwrap_or(grid.len());
         let data = Data::find(grid, decimal, first);
@@ -138,7 +138,7 @@ impl Header {
         Ok(top)
     }
 
-    /// `0,05,1600,1` under two names: commas that separate and commas that are decimal marks cannot be told apart.
+    /// Refuses `0,05,1600,1` under two names: separating commas and decimal commas are ambiguous.
     fn refuse_commas_for_both(&self, file: &str, grid: &Grid, first: usize) -> Result<(), ImportError> {
         let Some(above) = self.first_row.checked_sub(1).filter(|row| *row >= first) else { return Ok(()) };
         let names = grid.cells(above).len();
@@ -167,7 +167,7 @@ fn is_bracketed(cells: &[String]) -> bool {
     filled.peek().is_some() && filled.all(|cell| cell.starts_with(['(', '[']) && cell.ends_with([')', ']']))
 }
 
-/// True if a name says what is measured.
+/// True if a name is that of a measured quantity.
 fn is_quantity(heading: &str) -> bool {
     let (name, unit) = names::take_apart(heading);
     matches!(names::role(&name, unit.as_deref()), Some((_, Sureness::Strong)))

@@ -6,7 +6,7 @@ use crate::import::words::{DecimalMark, number};
 /// Quantities in turn, at most, and rows of each, at least.
 const MOST_QUANTITIES: usize = 4;
 const FEWEST_ROWS: usize = 10;
-/// By so much neighbours differ more than values of one quantity do from one to the next.
+/// Ratio by which neighbours differ more than values of one quantity do from one to the next.
 const APART: f64 = 5.0;
 
 /// The rows of lines that are a number each, of several quantities in turn; `None` if they are of one.

@@ -3,7 +3,7 @@
 use crate::import::bytes::{Cell, Rows};
 use crate::import::words::{DecimalMark, number, units};
 
-/// What the first line begins with, what ends a header, and the key that a segment's header begins with.
+/// Beginning of the first line, end of a header, and the first key of a segment's header.
 const MAGIC: &str = "LabVIEW Measurement";
 const END: &str = "***End_of_Header***";
 const SEGMENT: &str = "Channels";
@@ -45,7 +45,7 @@ pub(crate) fn rows<'a>(lines: &[(u64, &'a str)]) -> Option<(Rows<'a>, DecimalMar
     Some((out, decimal))
 }
 
-/// What the header of a segment says.
+/// Header of a segment.
 #[derive(Default)]
 struct Segment<'a> {
     /// The first time, and the step from row to row.
@@ -74,7 +74,7 @@ impl<'a> Segment<'a> {
         [Cell::text("Time (s)")].into_iter().chain(cells[1..].iter().enumerate().map(channel)).collect()
     }
 
-    /// The next row behind its time; `None` if the header does not say how rows follow each other.
+    /// Returns the next row behind its time; `None` if the header has no step between rows.
     fn row(&mut self, cells: &[&'a str], decimal: DecimalMark) -> Option<Vec<Cell<'a>>> {
         let step = number(self.step, decimal, 0)?;
         let first = number(self.first, decimal, 0).unwrap_or(0.0);
@@ -91,7 +91,7 @@ impl<'a> Segment<'a> {
     }
 }
 
-/// What stands behind a key, whatever separates them.
+/// Returns the value behind a key, whatever separates them.
 fn value<'a>(lines: &[(u64, &'a str)], key: &str) -> Option<&'a str> {
     let behind = lines.iter().find_map(|(_, line)| line.strip_prefix(key))?;
     behind.split(['\t', ',']).nth(1).map(str::trim)

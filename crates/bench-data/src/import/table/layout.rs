@@ -26,7 +26,7 @@ pub(crate) fn text_layout(
     (separator, mark, decimal.is_none() && mark_is_open(lines, separator, mark))
 }
 
-/// Numbers less texts, in lines of the best width. Numbers with marks of thousands count if `groups` says so.
+/// Counts numbers less texts, in lines of the best width. Numbers with marks of thousands count if `groups`.
 fn score(lines: &[&str], separator: Separator, mark: DecimalMark, groups: bool) -> i64 {
     let mut by_width: Vec<(usize, i64)> = Vec::new();
     for line in lines {

@@ -1,4 +1,4 @@
-//! From a file's contents to columns under their headings.
+//! Conversion of a file's contents to columns under their headings.
 
 mod columns;
 mod data;

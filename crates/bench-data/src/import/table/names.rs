@@ -15,7 +15,7 @@ const ROWS_BELOW: usize = 20;
 /// A line of names, one for each column.
 pub(crate) struct Names {
     pub cells: Vec<String>,
-    /// How many names there are, where that is another number than of columns.
+    /// Number of names, if it differs from that of columns.
     pub given: Option<usize>,
 }
 
@@ -98,7 +98,7 @@ impl Data {
         (0..names.len()).any(|place| far(place) == Some(true)).then_some(names)
     }
 
-    /// More names than there are columns, or fewer, of which one says what is measured: they are those of the first columns.
+    /// Takes more or fewer names than there are columns, one of them that of a measured quantity, for those of the first columns.
     fn some_names(&self, grid: &Grid, data: usize) -> Option<Names> {
         let (width, mut cells) = (self.shape.width, cells_above(grid, data.checked_sub(1)?)?);
         while cells.last().is_some_and(String::is_empty) {

@@ -3,7 +3,7 @@
 use crate::import::table::grid::Grid;
 use crate::import::words::{DecimalMark, number};
 
-/// What such a line has before the number …
+/// Words of such a line before the number …
 const WORDS: [&str; 12] = [
     "sampling rate",
     "sample rate",

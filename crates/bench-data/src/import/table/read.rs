@@ -150,7 +150,7 @@ fn of_grid(file: &str, grid: &Grid, header: Header, layout: Layout) -> Result<Ta
     Ok(Table { file: file.to_owned(), layout, metadata: header.metadata, columns, lines: numbers })
 }
 
-/// Where the lines begin that stand behind the data: text, sums with a word before them, and a line that was cut.
+/// Returns the first line behind the data: text, sums with a word before them, or a line that was cut.
 fn end_of_data(grid: &Grid, header: &Header, decimal: DecimalMark) -> usize {
     let is_behind = |row: &usize| {
         let shape = Shape::of(&grid.cells(*row), decimal);

@@ -1,7 +1,7 @@
 //! Records of `label: value`, as boards and command-line tools print them: on one line or over several.
 //!
-//! A record ends where one of its labels comes again, or at a line of `---`. Labels below an indented one, as YAML has them,
-//! are told apart by what stands above them.
+//! A record ends where one of its labels is repeated, or at a line of `---`. Labels below an indented one, as in YAML,
+//! are told apart by the labels above them.
 
 use std::collections::HashMap;
 
@@ -10,7 +10,7 @@ use crate::import::table::grid::{ARROW, MONITOR_CLOCK, SAMPLE, behind_arrow};
 use crate::import::words::stamp::SPLIT_SECONDS;
 use crate::import::words::{DecimalMark, Value, amount, has_groups, is_stamp, number, units, value};
 
-/// What the layout calls the separator.
+/// Name of the separator in the layout.
 pub(crate) const SEPARATOR: &str = "labels (serial plotter)";
 /// Labels of a record; text with more of them is prose.
 const MOST_LABELS: usize = 1000;
@@ -29,7 +29,7 @@ pub(crate) struct Records<'a> {
 /// A record; one without values is a line of something else.
 struct Record<'a> {
     line: u64,
-    /// What a serial monitor writes before its first line.
+    /// Text that a serial monitor writes before its first line.
     clock: &'a str,
     values: Vec<(usize, &'a str)>,
 }

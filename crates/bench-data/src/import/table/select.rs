@@ -17,7 +17,7 @@ const MOST_VALUES: usize = 8;
 pub struct RowFilter {
     /// Heading, name or number (from 1) of the column.
     pub column: String,
-    /// What stands there.
+    /// Value of the column in those rows.
     pub value: String,
 }
 

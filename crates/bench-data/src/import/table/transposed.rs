@@ -52,7 +52,7 @@ fn filled<'a>(grid: &'a Grid, row: usize) -> Vec<Cell<'a>> {
     cells
 }
 
-/// How many cells of each line are words before its numbers; `None` if some lines have one and others none.
+/// Returns the number of cells in each line that are words before its numbers; `None` if some lines have one and others none.
 fn labels(lines: &[Vec<Cell>], decimal: DecimalMark) -> Option<usize> {
     let of = |line: &Vec<Cell>| line.iter().take_while(|cell| !is_number(cell, decimal)).count();
     let most = lines.iter().map(of).max()?;

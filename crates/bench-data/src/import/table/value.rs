@@ -3,7 +3,7 @@
 use crate::import::bytes::Cell;
 use crate::import::words::{DecimalMark, SCPI_OVERLOAD, Value, is_stamp, number, value};
 
-/// What a cell of any container is. Numbers have no marks, whatever those of the file's texts are.
+/// Returns the value of a cell of any container. Numbers have no marks, whatever those of the file's texts are.
 pub(crate) fn value_of(cell: &Cell, mark: DecimalMark, shift: i32, own: &[String]) -> Value {
     match cell {
         Cell::Number(number) if shift == 0 && own.is_empty() && number.abs() < SCPI_OVERLOAD => Value::Number(*number),

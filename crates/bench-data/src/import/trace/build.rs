@@ -23,13 +23,13 @@ const MOST_TEXTS: usize = 8;
 pub struct Imported {
     /// The trace.
     pub trace: Trace,
-    /// What was left out, filled in or noticed, one line each.
+    /// Remarks on what was left out, filled in or noticed, one line each.
     pub remarks: Vec<String>,
-    /// Lag of the reference's clock that was taken out, where the motion told.
+    /// Lag of the reference's clock that was taken out, if it was found by the motion.
     pub lag: Option<Lag>,
     /// Rows left out because they had the time of the row before.
     pub duplicates: usize,
-    /// By how much neighbouring readings alternated, relative to their size, if they did: the current's polarity flips.
+    /// Amplitude by which neighbouring readings alternated, relative to their size, if they did: the current's polarity flips.
     pub alternation: Option<f64>,
 }
 

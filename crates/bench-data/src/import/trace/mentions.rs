@@ -1,4 +1,4 @@
-//! What an import says of files besides their columns: what was passed over, and how they were read.
+//! Remarks of an import on files besides their columns: on what was passed over, and on how they were read.
 
 use crate::counted::counted;
 use crate::import::trace::build::Work;

@@ -13,12 +13,12 @@ const FEW_SIGNS: f64 = 0.1;
 /// An import with nothing left open.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
-    /// What was answered.
+    /// Answers that were given.
     given: Recipe,
     /// The answers with those of the preset.
     pub(crate) recipe: Recipe,
     pub(crate) decision: Decision,
-    /// What follows from names or numbers, and is not said by a flag.
+    /// Conclusions from names or numbers that no flag stated.
     pub remarks: Vec<String>,
 }
 
@@ -67,7 +67,7 @@ impl Plan {
         &self.decision.readings[0].values
     }
 
-    /// The recipe that says all of this plan by flags.
+    /// Returns the recipe of flags for all of this plan.
     #[must_use]
     pub fn recipe(&self, tables: &[Table]) -> Recipe {
         if self.given.preset.is_some() {
@@ -113,7 +113,7 @@ impl Plan {
     }
 }
 
-/// A recipe that says which signs mean nothing: those of many readings, and those that flip from one to the next.
+/// Completes a recipe by signs that have no meaning: those of many readings, and those that flip from one to the next.
 fn with_signs(recipe: Recipe, role: Role, readings: &[f64]) -> Recipe {
     let known = readings.iter().filter(|value| !value.is_nan()).count();
     let negative = readings.iter().filter(|value| **value < 0.0).count();

@@ -1,4 +1,4 @@
-//! Several recordings in one file: the clock begins anew, or a column counts them.
+//! Several recordings in one file: the clock restarts, or a column counts them.
 
 use std::ops::Range;
 
@@ -14,8 +14,8 @@ const FEWEST_ROWS: usize = 3;
 const COUNTERS: [&str; 9] = ["trial", "run", "rep", "repetition", "recording", "session", "test", "experiment", "take"];
 
 impl Plan {
-    /// The recordings that stand one below the other in a file, each as tables of its own: where the clock begins anew, and
-    /// where a column called `trial`, `run` or so has another value. One, if there is no such place.
+    /// Splits a file into its recordings, one below the other, each as tables of its own: a new one begins where the clock restarts, or
+    /// where a column called `trial`, `run` or so has another value. Returns one recording if there is no such place.
     ///
     /// # Errors
     /// [`ImportError`] for times that cannot be read, rows that are out of order, and files beside the one with the readings.

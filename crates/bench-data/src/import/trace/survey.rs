@@ -10,7 +10,7 @@ const GAP: f64 = 3.0;
 /// The lowest part of the reference's range, in which drift is looked for.
 const LOWEST: f64 = 0.1;
 
-/// How a clock runs.
+/// Steps of a clock.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClockSurvey {
     /// Typical step, s.
@@ -34,7 +34,7 @@ pub struct Allan {
     pub deviation: f64,
 }
 
-/// What stands in a channel.
+/// Values of a channel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChannelSurvey {
     /// Known and missing values.
@@ -50,7 +50,7 @@ pub struct ChannelSurvey {
     pub allan: Vec<Allan>,
 }
 
-/// What the body does.
+/// Phases of the body's motion.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PhaseSurvey {
     /// Number of phases and their time, s: extend, hold, retract.
@@ -59,7 +59,7 @@ pub struct PhaseSurvey {
     pub segments: Vec<Segment>,
 }
 
-/// What there is to know of a recording before it is used.
+/// Survey of a recording before it is used.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Survey {
     /// The readings' clock.
@@ -72,16 +72,16 @@ pub struct Survey {
     pub phases: Option<PhaseSurvey>,
     /// Change of the readings from the first to the last time at rest (at all, without a reference), relative.
     pub drift: Option<f64>,
-    /// By how much neighbouring readings alternate, relative to their size, if they do.
+    /// Amplitude by which neighbouring readings alternate, relative to their size, if they do.
     pub alternation: Option<f64>,
-    /// How far the reference lags behind the readings.
+    /// Lag of the reference behind the readings.
     pub lag: Option<Lag>,
-    /// Why that is not known.
+    /// Reason for not knowing it.
     pub lag_unknown: Option<String>,
 }
 
 impl Survey {
-    /// Looks at a recording.
+    /// Surveys a recording.
     #[must_use]
     pub fn new(imported: &Imported) -> Self {
         let trace = &imported.trace;
@@ -109,7 +109,7 @@ impl Survey {
     }
 }
 
-/// How a clock runs; `duplicates` were left out of it.
+/// Surveys the steps of a clock; `duplicates` were left out of it.
 fn clock_survey(time_s: &[f64], duplicates: usize) -> ClockSurvey {
     let mut steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
     steps.sort_by(f64::total_cmp);
@@ -194,7 +194,7 @@ fn longest_hold(time_s: &[f64], segments: &[Segment]) -> Option<std::ops::Range<
     holds.max_by(|a, b| duration(time_s, a).total_cmp(&duration(time_s, b))).map(|hold| hold.rows.clone())
 }
 
-/// From the first tenth of the readings at the least strain to the last.
+/// Returns the relative change from the first tenth of the readings at the least strain to the last.
 fn drift(readings: &[f64], reference: Option<&[f64]>) -> Option<f64> {
     let known = reference.map(|reference| reference.iter().copied().filter(|value| !value.is_nan()));
     let range = known.map(extent);

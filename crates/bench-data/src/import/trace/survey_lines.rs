@@ -1,4 +1,4 @@
-//! What there is to know of a recording, in words.
+//! Survey of a recording in words.
 
 use crate::counted::counted;
 use crate::import::trace::survey::{ChannelSurvey, ClockSurvey, PhaseSurvey, Survey};

@@ -19,13 +19,13 @@ pub(crate) fn folded(name: &str) -> String {
     name.trim().to_lowercase().chars().map(plain).collect()
 }
 
-/// True if a name says that what stands in a column is the inverse of a resistance.
+/// True if the name of a column means the inverse of a resistance.
 pub(crate) fn is_conductance(name: &str) -> bool {
     let folded = folded(name);
     ["conductanc", "leitwert", "电导", "電導", "컨덕턴스"].iter().any(|part| folded.contains(part))
 }
 
-/// True if a name says that a strain is a stretch ratio: the length over that at rest.
+/// True if a strain's name means a stretch ratio: the length over that at rest.
 pub(crate) fn is_stretch_ratio(name: &str) -> bool {
     let letters: String = folded(name).chars().filter(|c| c.is_alphanumeric()).collect();
     is_among("λ,lambda,stretchratio,stretch", &letters) || letters.contains("stretchratio")

@@ -87,14 +87,14 @@ pub(crate) fn doubtful_unit(role: Role, heading: &str) -> Option<&str> {
     ends.contains(&end.to_lowercase().as_str()).then_some(end)
 }
 
-/// How sure a name is of a role.
+/// Certainty that a name means a role.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Sureness {
-    /// The unit alone says so, and could say so of something else too.
+    /// Role by the unit alone, which other columns could have, too.
     Weak,
-    /// The name says so, but for an index or a short word behind it.
+    /// Role by the name, except for an index or a short word behind it.
     Indexed,
-    /// The name says so.
+    /// Role by the name.
     Strong,
 }
 
@@ -129,7 +129,7 @@ const PART: &[(Role, &str)] = &[
     (Role::Temperature, "temperature,temperatur,温度,溫度,온도"),
 ];
 
-/// Words of a name that say neither what is measured nor in what: `thumb` of `Thumb angle (deg)`, `2` of `R2`.
+/// Returns the words of a name that are neither quantity nor unit: `thumb` of `Thumb angle (deg)`, `2` of `R2`.
 pub(crate) fn stem(name: &str) -> Vec<String> {
     let folded = folded(name);
     let mut words: Vec<String> = Vec::new();

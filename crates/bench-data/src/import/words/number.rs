@@ -1,7 +1,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// What stands before the fraction of a number.
+/// Mark before the fraction of a number.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum DecimalMark {
     /// `1.5`.
@@ -38,7 +38,7 @@ impl FromStr for DecimalMark {
     }
 }
 
-/// What a cell is.
+/// Value of a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Value {
     Number(f64),
@@ -70,7 +70,7 @@ pub(crate) fn is_missing(text: &str, own: &[String]) -> bool {
     MISSING.split(' ').any(|text| text == bare)
 }
 
-/// What a cell is, its number times 10^`shift`.
+/// Returns the value of a cell, its number times 10^`shift`.
 pub(crate) fn value(text: &str, mark: DecimalMark, shift: i32, own: &[String]) -> Value {
     let text = text.trim();
     match number(text, mark, shift) {

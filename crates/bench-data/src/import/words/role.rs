@@ -1,7 +1,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// What a column is to a trace.
+/// Role of a column in a trace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Role {
     /// Time of the readings, and of all else in the same file unless it has a clock of its own.
@@ -40,7 +40,7 @@ impl Role {
     pub(crate) const READINGS: [Self; 3] = [Self::Resistance, Self::Ratio, Self::Adc];
     pub(crate) const REFERENCES: [Self; 3] = [Self::Strain, Self::Displacement, Self::Angle];
 
-    /// As flags name it.
+    /// Returns its name in flags.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {

@@ -3,7 +3,7 @@ use chrono::{Datelike, NaiveDate};
 const SECOND: i128 = 1_000_000_000;
 pub(crate) const DAY: i128 = 86_400 * SECOND;
 
-/// How the parts of a date follow each other.
+/// Order of the parts of a date.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Order {
     /// `2024-05-01`.

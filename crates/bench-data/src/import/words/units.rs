@@ -2,23 +2,23 @@ use crate::import::words::number::{DecimalMark, Value, number, value};
 use crate::import::words::role::Role;
 use crate::metadata::{ResistanceUnit, StrainUnit};
 
-/// How numbers in a unit become numbers of the trace.
+/// Conversion of numbers in a unit to numbers of the trace.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Scale {
     /// Times a power of ten: the decimal mark moves, nothing is rounded.
     Shift(i32),
     /// Times a factor, plus an offset.
     Affine(f64, f64),
-    /// As `Shift`, and one over that: a conductance.
+    /// One over the number shifted like `Shift`: a conductance.
     Inverse(i32),
-    /// As `Shift`, plus one: changes relative to the resistance at rest.
+    /// The number shifted like `Shift`, plus one: changes relative to the resistance at rest.
     ChangeShift(i32),
     /// Text that is a date or a time of day.
     Stamp,
 }
 
 impl Scale {
-    /// By how many digits the decimal mark moves.
+    /// Returns the number of digits by which the decimal mark moves.
     pub(crate) const fn shift(self) -> i32 {
         match self {
             Self::Shift(shift) | Self::ChangeShift(shift) | Self::Inverse(shift) => shift,
@@ -147,7 +147,7 @@ pub(crate) fn ohms(text: &str, mark: DecimalMark) -> Option<f64> {
     number(text[..end].trim(), mark, shift)
 }
 
-/// What a text is where ohms may have a prefix.
+/// Returns the value of a text, in which ohms may have a prefix.
 pub(crate) fn amount(cell: &str, mark: DecimalMark) -> Value {
     match value(cell, mark, 0, &[]) {
         Value::Text => ohms(cell, mark).map_or(Value::Text, Value::Number),
@@ -177,7 +177,7 @@ pub(crate) fn unit_or_scale(role: Role, text: &str) -> Option<Unit> {
     Some(Unit { name: SCALED, scale })
 }
 
-/// How a reference is told that an instrument gives in volts or counts.
+/// Returns an example of the scale for a reference that an instrument gives in volts or counts.
 pub(crate) const fn scale_of_a_reference(role: Role) -> Option<&'static str> {
     match role {
         Role::Strain => Some("10percent/V"),

@@ -11,10 +11,10 @@ use crate::samples::{FEWEST_ROWS, Samples};
 
 use super::{FARTHEST_S, Lag, LagError, SURE, aligned};
 
-/// Where lags are looked for.
+/// Grid of the lags to try.
 #[derive(Clone, Copy)]
 struct Lags {
-    /// In the middle of the lags tried, s.
+    /// Middle of the lags tried, s.
     around_s: f64,
     /// Lags tried reach this far to both sides, s.
     reach_s: f64,
@@ -31,15 +31,15 @@ const NEAR: Lags = Lags { around_s: 0.0, reach_s: 1.0, steps: 20, rows: 6000 };
 /// Movements that repeat look alike one period later: of lags about as good as the best one, in squared error, the
 /// smallest is taken.
 const AS_GOOD: f64 = 1.2;
-/// A gauge alone that leaves less than this of the readings' changes has a say where a body does not rest: a law with branches takes
-/// a lag for relaxation in slow and even motion, and half a period for another part of it. Public recordings of movements leave
-/// 0.03 to 0.2. In holds the law sees relaxation by itself, and a gauge takes it for a lag, with gains of up to 55.
+/// Largest unexplained share of the readings' changes with which a gauge alone is used, where a body does not rest: a law with
+/// branches takes a lag for relaxation in slow and even motion, and half a period for another part of it. Public recordings of
+/// movements leave 0.03 to 0.2. In holds the law sees relaxation by itself, and a gauge takes it for a lag, with gains of up to 55.
 const OF_GAUGE: f64 = 0.3;
 /// A sensor's own hysteresis lags behind the strain, which a gauge takes for an early reference: by up to this share of a movement.
 const OWN_SHARE: f64 = 0.1;
 /// Ridge of the law, in the middle of those that calibration tries.
 const RIDGE: f64 = 0.01;
-/// From this gain on there hardly is a doubt. Of 1440 simulated recordings as they are, whole, halves and thirds, 43 show a lag of more
+/// Gain from which on there is hardly a doubt. Of 1440 simulated recordings as they are, whole, halves and thirds, 43 show a lag of more
 /// than a tenth of a movement with a gain of [`SURE`] (in three movements between long holds up to 5.5, by a gauge up to 4.6), four with
 /// this one (halves with sines of a sensor with much hysteresis). Of public recordings, whole to quarters, none shows more than 3.2.
 const CERTAIN: f64 = 6.0;
@@ -59,9 +59,9 @@ const GAUGE: usize = 3;
 /// second and more. A dash-pot is left out because it looks like a lag: what a sensor has of one is part of the answer. A
 /// movement that repeats cannot tell a lag from one that is a period longer; the smaller one is given.
 ///
-/// The gauge alone is asked besides, over ±12 s, where a body does not rest and the gauge explains most of the changes: it does not
-/// take a lag for relaxation, but cannot know what the sensor lags itself. A lag of the law that it contradicts is none. Its own, in
-/// the middle of what it leaves open, is believed from 0.15 movements on.
+/// The gauge alone is used besides, over ±12 s, where a body does not rest and the gauge explains most of the changes: it does not
+/// take a lag for relaxation, but cannot know the sensor's own lag. If it contradicts the lag of the law, that lag is discarded. Its own
+/// lag, in the middle of the range it leaves open, is accepted from 0.15 movements on.
 pub(super) fn lag_by_law(samples: &Samples) -> Result<Lag, LagError> {
     let errors = errors(samples, FAR).ok_or(LagError::Short)?;
     match by_law_and_gauge(samples, &errors) {
@@ -152,9 +152,9 @@ fn best_lag(errors: &[f64], search: Lags) -> Option<(f64, f64)> {
 
 /// Errors at every lag of a search.
 struct Errors {
-    /// Of the law.
+    /// Errors of the law.
     law: Vec<f64>,
-    /// Of the gauge alone.
+    /// Errors of the gauge alone.
     gauge: Vec<f64>,
 }
 
@@ -171,7 +171,7 @@ impl Lags {
         self.reach_s / f64::from(self.steps)
     }
 
-    /// How far the i-th lag is from the middle, s.
+    /// Returns the distance of the i-th lag from the middle, s.
     fn offset_s(&self, i: usize) -> f64 {
         (i as f64 - f64::from(self.steps)) * self.step_s()
     }

@@ -16,13 +16,13 @@ use search::Search;
 
 /// Lags of a reference on the readings' clock are looked for this far, s: as far as devices started by hand are apart.
 const FARTHEST_S: f64 = 12.0;
-/// In a recording of so many times that the law tells the lag: it knows relaxation, and asks for readings with a reference on both
-/// sides of all lags. In shorter ones it takes one movement for another, and the motion alone is asked.
+/// Length of a recording, in multiples of the farthest lag, from which on the law tells the lag: it knows relaxation, and needs
+/// readings with a reference on both sides of all lags. In shorter ones it takes one movement for another, and only the motion is used.
 const LONG: f64 = 10.0;
-/// By this factor a lag has to lower the squared error to be said. Of 104 public recordings as they are, parts of 15 s and more among
-/// them, two show as much.
+/// Factor by which a lag has to lower the squared error to be reported. Of 104 public recordings as they are, parts of 15 s and more
+/// among them, two show as much.
 const SURE: f64 = 2.5;
-/// From this gain on there hardly is a doubt, if the motion explains the readings and the lag is more than a sensor's own: none of
+/// Gain from which on there is hardly a doubt, if the motion explains the readings and the lag is more than a sensor's own: none of
 /// those 104, and of 311 simulated ones, shows all three …
 const CERTAIN: f64 = 6.0;
 /// … but for this share of their variance, at most.
@@ -43,7 +43,7 @@ pub struct Lag {
     /// Standard deviation, s: from leaving out a tenth of the rows at a time and from what counts as slow, or of the lags that were
     /// tried.
     pub sd_s: f64,
-    /// Standard deviation of the lag that the sensor itself may have and that is not told apart, s.
+    /// Standard deviation of the lag that the sensor itself may have, which cannot be told apart from the reference's, s.
     pub own_s: f64,
     /// Duration of a movement, s.
     pub movement_s: f64,
@@ -84,7 +84,7 @@ impl fmt::Display for Lag {
     }
 }
 
-/// Why the motion does not tell a lag.
+/// Reason why the motion does not tell a lag.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum LagError {
@@ -105,14 +105,14 @@ pub enum LagError {
     Repeats(f64, f64),
 }
 
-/// Lag of a reference on the readings' clock, within ±12 s.
+/// Finds the lag of a reference on the readings' clock, within ±12 s.
 ///
-/// In recordings of two minutes and more at which lag a law with two branches explains the readings best, on blocks left out. In
-/// shorter ones, at each lag the readings are regressed on what the reference says of them there: its first three powers, and its movements,
-/// with and without their sign, through low-passes of one and eight times the time of a full stretch. What is slower than two
-/// full stretches is taken out of both sides. A lag is judged by readings that are left out of the regression, and rows that it
-/// leaves without a reference count as unexplained. Where the readings do not speak against a reference on time, that is
-/// the lag that is given. Rows that calibration does not believe take no part.
+/// In recordings of two minutes and more it is the lag at which a law with two branches explains the readings best, on held-out blocks. In
+/// shorter ones, at each lag the readings are regressed on the reference there: its first three powers, and its movements,
+/// with and without their sign, through low-passes of one and eight times the time of a full stretch. Changes slower than two
+/// full stretches are taken out of both sides. A lag is judged by readings that are left out of the regression, and rows that it
+/// leaves without a reference count as unexplained. Zero is returned unless the readings speak against a reference
+/// on time. Rows that calibration does not believe take no part.
 ///
 /// # Errors
 /// [`LagError`] if the motion does not tell.
@@ -171,7 +171,7 @@ pub fn clock_lag(readings: (&[f64], &[f64]), reference: (&[f64], &[f64])) -> Res
     search.lag(best, readings, reference)
 }
 
-/// The reference of each row, moved by `-lag_s`: what it says that much later, interpolated; NaN beyond its ends.
+/// Returns the reference of each row, moved by `-lag_s`: its value that much later, interpolated; NaN beyond its ends.
 #[must_use]
 pub fn aligned(samples: &Samples, lag_s: f64) -> Vec<f64> {
     let known: Vec<(f64, f64)> = samples

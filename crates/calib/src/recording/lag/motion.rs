@@ -12,7 +12,7 @@ const MOST_READINGS: f64 = 1500.0;
 const SLOW_SHARE: f64 = 1.0 / 6.0;
 /// Smaller movements, as a share of the range, are no way.
 const LEAST_STROKE: f64 = 0.1;
-/// Fewest rows that say something.
+/// Least number of rows for a regression.
 const FEWEST: usize = 40;
 /// Blocks of neighbours that are left out in turn.
 pub(super) const BLOCKS: usize = 10;
@@ -206,7 +206,7 @@ impl Sums {
         self.square += value * value;
     }
 
-    /// With the rows of another one, or without them (`sign` -1).
+    /// Adds the rows of another sum, or removes them (`sign` -1).
     fn with(mut self, other: &Self, sign: f64) -> Self {
         self.count += sign * other.count;
         self.matrix += other.matrix * sign;

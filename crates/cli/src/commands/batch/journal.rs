@@ -12,7 +12,7 @@ use crate::input::sha256_of;
 use crate::output::is_this_program;
 use crate::whole_file;
 
-/// What became of a job: a line of the journal, a row of the summary.
+/// Result of a job: a line of the journal, a row of the summary.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Entry {
     pub command: String,
@@ -21,7 +21,7 @@ pub struct Entry {
     pub sha256: Vec<String>,
     pub sensor: Option<PathBuf>,
     pub sensor_sha256: Option<String>,
-    /// Of what `--prior` among the flags names.
+    /// SHA-256 of the file that `--prior` among the flags names.
     pub prior_sha256: Option<String>,
     /// Flags but for `--sensor` and what `batch` adds.
     pub flags: Vec<String>,
@@ -33,7 +33,7 @@ pub struct Entry {
     pub state: State,
     /// Exit code of the command; `None` if it had no chance to give one.
     pub exit_code: Option<i32>,
-    /// Why it failed.
+    /// Reason for its failure.
     pub message: String,
     pub warnings: Vec<String>,
     /// Rows of the output's table, or rows that were scored.
@@ -42,15 +42,15 @@ pub struct Entry {
     pub figures: Figures,
 }
 
-/// Whether a job is done.
+/// State of a job.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum State {
     /// Its output is there.
     Done,
-    /// It was there before.
+    /// The output was there before.
     Kept,
-    /// It is not, or found wanting by `evaluate --check`.
+    /// No output, or one that `evaluate --check` found wanting.
     #[default]
     Failed,
 }
@@ -67,7 +67,7 @@ impl State {
 }
 
 impl Entry {
-    /// Whether two entries are of the same work: the same program, command, flags and bytes.
+    /// True if two entries are of the same work: the same program, command, flags and bytes.
     fn is_same_work(&self, other: &Self) -> bool {
         let work = |of: &Self| {
             let names: Vec<_> = of.files.iter().filter_map(|file| file.file_name()).map(ToOwned::to_owned).collect();
@@ -78,7 +78,7 @@ impl Entry {
     }
 }
 
-/// What earlier runs have done, and this one does: a line of JSON each, the last one of an output counts.
+/// Journal of the jobs of earlier runs and of this one: a line of JSON each, of which the last one of an output counts.
 pub struct Journal {
     folder: PathBuf,
     known: HashMap<PathBuf, Entry>,
@@ -89,7 +89,7 @@ pub struct Journal {
 pub const JOURNAL: &str = "batch.jsonl";
 
 impl Journal {
-    /// Reads the journal of a folder, and begins one if there is none. A file of this name that somebody else wrote is replaced
+    /// Reads the journal of a folder, and begins one if there is none. A file of this name from another program is replaced
     /// with `force` only.
     pub fn open(folder: &Path, force: bool) -> Result<Self, CliError> {
         let path = folder.join(JOURNAL);
@@ -116,12 +116,12 @@ impl Journal {
         Ok(Self { folder: folder.to_path_buf(), known, file: Mutex::new(file) })
     }
 
-    /// Whether an earlier run wrote this output.
+    /// True if an earlier run wrote this output.
     pub fn knows(&self, output: &Path) -> bool {
         self.known.contains_key(output)
     }
 
-    /// What an earlier run made of the same work, if it is still there.
+    /// Returns an earlier run's entry of the same work, if its output is still there.
     pub fn finished(&self, work: &Entry) -> Option<Entry> {
         let known = self.known.get(&work.output)?;
         let is_there = || sha256_of(&self.folder.join(&known.output)).ok() == known.output_sha256;
@@ -139,7 +139,7 @@ impl Journal {
     }
 }
 
-/// Whether a journal begins with a line of this program, or with as much of one as a killed run wrote.
+/// True if a journal begins with a line of this program, or with as much of one as a killed run wrote.
 fn is_ours(text: &str) -> bool {
     let (first, is_whole) = text.split_once('\n').map_or((text, false), |(first, _)| (first, true));
     let made_by = |line: serde_json::Value| line.get("made_by")?.as_str().map(is_this_program);

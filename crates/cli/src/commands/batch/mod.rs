@@ -25,7 +25,7 @@ use crate::messages::Messages;
 use crate::output::{Kind, Outputs};
 use crate::progress::Progress;
 
-/// Does all recordings that are not done yet, and sums up.
+/// Runs the command on all recordings that are not done yet, and sums up.
 pub fn run(args: &BatchArgs, messages: &Messages) -> Result<(), CliError> {
     let jobs = plan::jobs(args)?;
     plan::check_sensor(&jobs, args)?;
@@ -60,7 +60,7 @@ struct Work<'a> {
 }
 
 impl Work<'_> {
-    /// Does all jobs, the largest first, so that no core waits long for another at the end; entries in the jobs' order.
+    /// Runs all jobs, the largest first, so that no core waits long for another at the end; returns entries in the jobs' order.
     fn all(&self) -> Result<Vec<Entry>, CliError> {
         let mut order: Vec<usize> = (0..self.jobs.len()).collect();
         order.sort_by_key(|job| std::cmp::Reverse(self.jobs[*job].bytes()));
@@ -88,7 +88,7 @@ impl Work<'_> {
         Ok(entries.into_iter().map(|(_, entry)| entry).collect())
     }
 
-    /// Does a job, unless that was done before.
+    /// Runs a job, unless that was done before.
     fn one(&self, job: &Job) -> Result<Entry, CliError> {
         let mut entry = self.workshop.entry(job);
         if let Err(message) = self.workshop.hash_inputs(job, &mut entry) {
@@ -109,7 +109,7 @@ impl Work<'_> {
     }
 }
 
-/// Says how many there are of each kind, and which summaries are not of this run.
+/// Prints the number of jobs of each kind, and names the summaries that are not of this run.
 fn closing(entries: &[Entry], summary: &Path, stale: &[PathBuf], messages: &Messages) -> Result<(), CliError> {
     let count = |state| entries.iter().filter(|entry| entry.state == state).count();
     let (done, kept, failed) = (count(State::Done), count(State::Kept), count(State::Failed));

@@ -21,9 +21,9 @@ pub struct Job {
     pub files: Vec<PathBuf>,
     /// The sensor's parameters, if the command is given some.
     pub sensor: Option<PathBuf>,
-    /// What `--prior` among the flags names.
+    /// File that `--prior` among the flags names.
     pub prior: Option<PathBuf>,
-    /// What `--estimator` among the flags names.
+    /// Estimator that `--estimator` among the flags names.
     estimator: Option<EstimatorKind>,
     /// Flags besides.
     pub flags: Vec<String>,
@@ -42,12 +42,12 @@ impl Job {
         self.files.iter().chain(&self.sensor).chain(&self.prior)
     }
 
-    /// What messages call it.
+    /// Returns its name in messages.
     pub fn name(&self) -> String {
         self.files.iter().map(|file| file.display().to_string()).collect::<Vec<_>>().join(", ")
     }
 
-    /// The command that does it, as a person would type it; where it writes to is not said yet.
+    /// Parses the command that does it, as a person would type it; its output is not given yet.
     pub fn parsed(&self, args: &BatchArgs) -> Result<Args, clap::Error> {
         let mut words = vec!["ohmstrain".to_owned(), args.command.name().to_owned()];
         if args.command == BatchCommand::Calibrate {
@@ -164,7 +164,7 @@ impl Row<'_> {
         Ok(job)
     }
 
-    /// What is written lies below the folder of outputs.
+    /// Returns the path of an output; fails unless it lies below the folder of outputs.
     fn below(&self, column: &str, cell: &str) -> Result<PathBuf, CliError> {
         let parts = || Path::new(cell).components().filter(|part| *part != Component::CurDir);
         if parts().next().is_some() && parts().all(|part| matches!(part, Component::Normal(_))) {
@@ -177,7 +177,7 @@ impl Row<'_> {
     }
 }
 
-/// Names outputs that nobody has named: as the recordings lie below the folder that all of them share.
+/// Names the outputs without a name after the recordings' paths below the folder that all of them share.
 fn name_outputs(jobs: &mut [Job], args: &BatchArgs) {
     let ending = match args.command {
         BatchCommand::Filter | BatchCommand::Smooth => args.format.name(),
@@ -207,7 +207,7 @@ fn name_outputs(jobs: &mut [Job], args: &BatchArgs) {
     }
 }
 
-/// What the command would say to its arguments is said before anything is done.
+/// Checks the arguments of the command before anything is done.
 fn check_arguments(job: &mut Job, args: &BatchArgs) -> Result<(), CliError> {
     if job.files.iter().any(|file| file == Path::new("-")) {
         return Err(CliError::Arguments("batch reads files; for standard input there is the command itself".into()));
@@ -254,7 +254,7 @@ fn is_output(flag: &str) -> bool {
     ["--report", "--figures"].contains(&flag.split('=').next().unwrap_or_default())
 }
 
-/// A sensor that recordings share is said to be none, or none for their estimator, before anything is done, and once.
+/// Refuses a shared sensor file that is none, or none for the jobs' estimator, before anything is done, and once.
 pub fn check_sensor(jobs: &[Job], args: &BatchArgs) -> Result<(), CliError> {
     let shared = jobs.iter().filter_map(|job| job.sensor.as_ref().map(|sensor| (sensor, job.estimator)));
     let shared: HashSet<_> = shared.filter(|(sensor, _)| args.sensor.as_ref() == Some(*sensor)).collect();

@@ -3,31 +3,31 @@ use serde::{Deserialize, Serialize};
 
 use crate::commands::evaluate::RecordingScores;
 
-/// What `evaluate` found of the first estimator, or `calibrate` on the parts that it left out: errors in %FS, coverage as
+/// Scores of `evaluate` for the first estimator, or of `calibrate` on its held-out parts: errors in %FS, coverage as
 /// a share.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Figures {
     /// Rows that were scored.
     pub rows: Option<u64>,
-    /// Of the filter.
+    /// Error of the filter.
     pub filter_percent_fs: Option<f64>,
-    /// Of the smoother.
+    /// Error of the smoother.
     pub smoother_percent_fs: Option<f64>,
-    /// Of strain as a cubic polynomial of the reading.
+    /// Error of strain as a cubic polynomial of the reading.
     pub static_cubic_percent_fs: Option<f64>,
-    /// Of the filter's 95 % interval.
+    /// Coverage of the filter's 95 % interval.
     pub coverage_95: Option<f64>,
     /// Its mean width.
     pub width_95_percent_fs: Option<f64>,
 }
 
 impl Figures {
-    /// Of an estimator on a recording.
+    /// Collects the scores of an estimator on a recording.
     pub fn of_scores(scores: &RecordingScores) -> Self {
         Self::new(&scores.filter, Some(&scores.smoother), &scores.baselines.static_cubic)
     }
 
-    /// Of a calibration.
+    /// Collects the scores of a calibration.
     pub fn of_findings(findings: &Findings) -> Self {
         Self::new(&findings.filter, findings.smoother.as_ref(), &findings.static_cubic)
     }

@@ -48,7 +48,7 @@ fn cells(entry: &Entry) -> Vec<(&'static str, Cell)> {
     ]
 }
 
-/// What its name begins with.
+/// Beginning of its name.
 pub const SUMMARY: &str = "summary";
 
 /// Names of its columns.

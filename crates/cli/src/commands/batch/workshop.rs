@@ -23,24 +23,24 @@ use ohmstrain::MADE_BY;
 /// Exit code of a program that has met a bug.
 const PANICKED: u8 = 101;
 
-/// Where jobs are done.
+/// Folder and settings in which jobs are done.
 pub struct Workshop<'a> {
     args: &'a BatchArgs,
-    /// For outputs until they are whole; in the folder of outputs, so that taking their place is a change of name.
+    /// Folder for outputs until they are whole; it lies in the folder of outputs, so that taking their place is a change of name.
     drafts: UnfinishedFolder,
     /// Hashes of sensors and priors: many recordings share one.
     shared: Mutex<HashMap<PathBuf, String>>,
 }
 
 impl<'a> Workshop<'a> {
-    /// In the folder of outputs.
+    /// Creates the workshop in the folder of outputs.
     pub fn new(args: &'a BatchArgs) -> Result<Self, CliError> {
         let drafts =
             UnfinishedFolder::inside(&args.output).map_err(|error| CliError::file("write to", &args.output, &error))?;
         Ok(Self { args, drafts, shared: Mutex::default() })
     }
 
-    /// What is known of a job before it begins.
+    /// Returns the entry of a job before it begins.
     pub fn entry(&self, job: &Job) -> Entry {
         Entry {
             command: self.args.command.name().to_owned(),
@@ -56,7 +56,7 @@ impl<'a> Workshop<'a> {
     /// Adds the hashes of all inputs.
     ///
     /// # Errors
-    /// Which one cannot be read.
+    /// The input that cannot be read.
     pub fn hash_inputs(&self, job: &Job, entry: &mut Entry) -> Result<(), String> {
         let unreadable = |file: &Path, error: &io::Error| format!("cannot read {}: {error}", file.display());
         for file in &job.files {
@@ -81,7 +81,7 @@ impl<'a> Workshop<'a> {
         Ok(hash)
     }
 
-    /// Does the job, and notes what became of it before its output takes its place.
+    /// Runs the job, and records its result before its output takes its place.
     ///
     /// # Errors
     /// If the folder of outputs cannot be written.
@@ -129,7 +129,7 @@ impl<'a> Workshop<'a> {
     }
 }
 
-/// Does a command whose output goes to `draft`.
+/// Runs a command whose output goes to `draft`.
 fn obey(command: Command, draft: &Path, entry: &mut Entry, messages: &Messages) -> Result<(), CliError> {
     match command {
         Command::Filter(mut args) => {
@@ -163,7 +163,7 @@ fn obey(command: Command, draft: &Path, entry: &mut Entry, messages: &Messages) 
     Ok(())
 }
 
-/// What a panic says.
+/// Returns the message of a panic.
 fn text_of(panic: &(dyn Any + Send)) -> &str {
     let text = panic.downcast_ref::<String>().map(String::as_str);
     text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("it does not say which")

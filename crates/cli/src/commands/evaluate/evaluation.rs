@@ -16,15 +16,15 @@ const SCHEMA: u32 = 3;
 /// All scores, recording by recording.
 #[derive(Default)]
 pub struct Evaluation {
-    /// The report, if one was asked for.
+    /// Report, if one was requested.
     pub drawn: Option<Drawn>,
     recordings: Vec<Vec<RecordingScores>>,
 }
 
-/// What `--json` prints.
+/// Content of the output of `--json`.
 #[derive(Serialize)]
 struct Json<'a> {
-    /// The commit that the program was built from, where it was said.
+    /// Commit that the program was built from, if known.
     commit: Option<&'static str>,
     /// Seed of the motions that calibration simulates; nothing else draws.
     simulated_seed: u64,
@@ -39,7 +39,7 @@ impl Evaluation {
         self.recordings.push(scores);
     }
 
-    /// Whether nothing was scored.
+    /// True if nothing was scored.
     pub fn is_empty(&self) -> bool {
         self.recordings.is_empty()
     }

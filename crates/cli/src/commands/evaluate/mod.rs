@@ -34,7 +34,7 @@ pub fn run(args: &EvaluateArgs, messages: &Messages) -> Result<(), CliError> {
     evaluate(args, messages, &mut Evaluation::default(), |evaluation| print(|out| evaluation.write(out, args.json)))
 }
 
-/// The same into an `evaluation`, which is shown once all that can be scored is.
+/// Evaluates into an `evaluation`, which is shown once all that can be scored is.
 pub fn evaluate(
     args: &EvaluateArgs,
     messages: &Messages,
@@ -63,7 +63,7 @@ pub fn evaluate(
     if args.check { check(evaluation) } else { Ok(()) }
 }
 
-/// Every recording with the parameters of a file.
+/// Evaluates every recording with the parameters of a file.
 fn with_sensor_file(
     args: &EvaluateArgs,
     path: &Path,
@@ -76,7 +76,7 @@ fn with_sensor_file(
     add_until_error(evaluation, args.traces.par_iter().map(judged).collect(), messages)
 }
 
-/// Every recording with parameters from some of its rows, split by split.
+/// Evaluates every recording with parameters from some of its rows, split by split.
 fn with_splits(args: &EvaluateArgs, evaluation: &mut Evaluation, messages: &Messages) -> Result<(), CliError> {
     let progress = Progress::new("calibrating", messages);
     for path in &args.traces {
@@ -111,7 +111,7 @@ fn with_split(
     Ok((scores, drawn))
 }
 
-/// Some recordings with parameters from others.
+/// Evaluates some recordings with parameters from others.
 fn with_training(args: &EvaluateArgs, evaluation: &mut Evaluation, messages: &Messages) -> Result<(), CliError> {
     let progress = Progress::new("calibrating", messages);
     let read = |path| read(args, path);
@@ -124,7 +124,7 @@ fn with_training(args: &EvaluateArgs, evaluation: &mut Evaluation, messages: &Me
     add_until_error(evaluation, tests.par_iter().map(judged).collect(), messages)
 }
 
-/// Every recording with parameters from all others.
+/// Evaluates every recording with parameters from all others.
 fn with_each_left_out(args: &EvaluateArgs, evaluation: &mut Evaluation, messages: &Messages) -> Result<(), CliError> {
     let mut recordings: Vec<TraceFile> = args.traces.iter().map(|path| read(args, path)).collect::<Result<_, _>>()?;
     if recordings.len() < 2 {
@@ -180,7 +180,7 @@ fn calibrated(
     Ok((sensors, Rivals { static_cubic: baselines.static_cubic, learned: Some(baselines), published }))
 }
 
-/// What comes of a recording.
+/// Result for a recording.
 #[derive(Default)]
 struct Judged {
     scores: Vec<RecordingScores>,

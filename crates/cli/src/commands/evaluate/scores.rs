@@ -14,28 +14,28 @@ pub struct RecordingScores {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub split: Option<String>,
     pub estimator: &'static str,
-    /// Which strains the reference told to the estimator, if it told any.
+    /// Name of the known strains that the reference gave to the estimator, if it gave any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub known: Option<String>,
-    /// Whether the rows that are scored were calibrated on.
+    /// Overlap of the scored rows with the calibration.
     #[serde(skip)]
     pub sample: Sample,
-    /// Whether it is shown to say what the estimator before it is made of, or what known strains bring.
+    /// True if it is shown as a part of the estimator before it, or to show the effect of known strains.
     #[serde(skip)]
     pub is_part: bool,
     #[serde(flatten)]
     pub filter: Scores,
     pub smoother: Scores,
-    /// What the filter says of where readings settle, where rows of long holds are scored.
+    /// Scores of the filter's settled readings, if rows of long holds are scored.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub settled: Option<SettledScores>,
     /// Wall-clock time of the calibration, s; `None` if it was read from a file.
     pub calibration_s: Option<f64>,
-    /// Lag of the reference, where it was looked for; `None` inside if it cannot be told.
+    /// Lag of the reference, where it was looked for; `None` inside if it is unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lag_s: Option<Option<f64>>,
     pub baselines: BaselineScores,
-    /// What the errors are errors of, for the table's header.
+    /// Quantity of the errors, for the table's header.
     #[serde(skip)]
     pub quantity: Quantity,
 }
@@ -57,12 +57,12 @@ pub struct LearnedScores {
     pub fir_20s: Scores,
     pub low_pass_mode: Scores,
     pub leaky_bank: Scores,
-    /// Of the published law, told its phases; none where calibration did not move both ways.
+    /// Scores of the published law, with known phases; `None` if the motion of calibration had one direction only.
     pub relaxing_modulus: Option<Scores>,
 }
 
 impl BaselineScores {
-    /// With the names of the table.
+    /// Returns the scores with the names of the table.
     pub fn named(&self) -> impl Iterator<Item = (&'static str, Scores)> {
         let learned = self.learned.map(|learned| {
             [

@@ -27,13 +27,13 @@ pub struct Sensor {
     pub kind: EstimatorKind,
     /// Wall-clock time of the calibration, s; `None` if it was read from a file.
     calibration_s: Option<f64>,
-    /// Whether it is shown to say what another one is made of.
+    /// True if it is shown as a part of another one.
     is_part: bool,
-    /// What the scores are called: the estimator's name, or what it does without.
+    /// Name of the scores: the estimator's name, or that of the part left out.
     name: &'static str,
 }
 
-/// What the sensor is compared with.
+/// Estimators that the sensor is compared with.
 pub struct Rivals {
     pub static_cubic: StaticCubic,
     /// The others, where there are rows to fit them to.
@@ -42,13 +42,13 @@ pub struct Rivals {
     pub published: Option<PublishedLaw>,
 }
 
-/// What the body does, by the reference.
+/// Returns the phases of the body's motion, by the reference.
 pub fn phases(time_s: &[f64], strain: &[f64]) -> Vec<PhaseRows> {
     segment(time_s, strain).into_iter().map(|segment| (segment.phase, segment.rows)).collect()
 }
 
 impl Sensor {
-    /// One per estimator asked for, with the parameters of a file; at least one.
+    /// Reads a sensor for each requested estimator, with the parameters of a file; at least one.
     pub fn from_file(path: &Path, estimators: Estimators, corrects: bool) -> Result<Vec<Self>, CliError> {
         let wanted = if let Estimators::One(kind) = estimators { Some(kind) } else { None };
         let sensor = sensor_file::read(path, wanted)?;
@@ -67,8 +67,8 @@ impl Sensor {
         Ok(kinds.into_iter().map(judged).collect())
     }
 
-    /// One per estimator asked for, each calibrated as `calibrate --estimator` does; at least one. What a correction
-    /// corrects comes after it, as a part.
+    /// Calibrates a sensor for each requested estimator, as `calibrate --estimator` does; at least one. After a correction comes the
+    /// filter that it corrects, as a part.
     pub fn calibrated(
         training: &[TraceFile],
         estimators: Estimators,
@@ -101,7 +101,7 @@ impl Sensor {
         Ok(sensors.filter(|sensor| !(sensor.is_part && wanted.contains(&sensor.kind))).collect())
     }
 
-    /// Whether it is shown to say what another one is made of.
+    /// True if it is shown as a part of another one.
     pub const fn is_part(&self) -> bool {
         self.is_part
     }

@@ -14,10 +14,10 @@ const LEAST_HOLD_S: f64 = 60.0;
 /// Rows are scored from so long after a hold's start, s, to so long before its end.
 const FROM_S: f64 = 2.0;
 const BEFORE_END_S: f64 = 10.0;
-/// What is told in this time, s, is told early.
+/// Time after a hold's start, s, up to which a row counts as early.
 const EARLY_S: f64 = 30.0;
 
-/// How well the settled resistance of the rows of holds tells what is read at their ends. In the unit of the readings.
+/// Scores of the settled resistance in the rows of holds as a prediction of the reading at their ends. In the unit of the readings.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct SettledScores {
     /// Holds of a minute or longer of which every row is scored.
@@ -26,7 +26,7 @@ pub struct SettledScores {
     n: usize,
     /// Share of them whose 95 % interval holds the last reading.
     coverage_95: f64,
-    /// The same of rows of the first half minute.
+    /// Coverage of rows of the first half minute.
     early_coverage_95: f64,
     rmse: f64,
     width_95: f64,
@@ -36,7 +36,7 @@ pub struct SettledScores {
 }
 
 impl SettledScores {
-    /// Of the holds of a recording, whose strains have a range of `span`; `None` without a long one.
+    /// Computes the scores for the holds of a recording, whose strains have a range of `span`; `None` without a long one.
     pub fn new(recording: &TraceFile, estimates: &[Estimate], part: Part, span: f64) -> Result<Option<Self>, CliError> {
         let time_s = &recording.trace.time_s;
         let mut holds = holds(&recording.samples()?, span, LEAST_HOLD_S);
@@ -70,7 +70,7 @@ impl SettledScores {
     }
 }
 
-/// Scores of what is said of rows, and its deviation, against the last reading of their hold.
+/// Scores predictions of rows, with their deviations, against the last reading of their hold.
 fn scores(rows: &[(f64, &Estimate)], said: impl Fn(&Estimate) -> Option<(f64, Option<f64>)>) -> Option<Scores> {
     let scored = |(truth, row): &(f64, &Estimate)| {
         let (strain, sd) = said(row)?;

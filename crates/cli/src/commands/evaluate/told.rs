@@ -4,20 +4,20 @@ use ohmstrain_sensor::RangeParams;
 use crate::commands::scoring::Part;
 use crate::input::TraceFile;
 
-/// How near an end of the reference's range a strain is one at that end, in ranges.
+/// Largest distance from an end of the reference's range at which a strain counts as one at that end, in ranges.
 const NEAR_END: f64 = 0.1;
 
 /// Strains that the reference tells an estimator before it is scored with it.
 pub struct Told {
-    /// What tables call them; none if there is none.
+    /// Name in tables; `None` if there are no known strains.
     pub name: Option<String>,
     /// The strains.
     pub known: Vec<Known>,
 }
 
 impl Told {
-    /// None, and, if a time between them is given, s, one after every such time, and the first ones near the ends of the range;
-    /// all of them in the part that is scored, and within what an estimator can be told.
+    /// Returns the cases: no known strain; if a time between them is given, s, one known strain after every such time, and the first ones
+    /// near the ends of the range. All of them lie in the part that is scored, and in the range that an estimator accepts.
     pub fn cases(recording: &TraceFile, part: Part, limits: RangeParams, every_s: Option<f64>) -> Vec<Self> {
         let mut cases = vec![Self { name: None, known: Vec::new() }];
         if let Some(every_s) = every_s {

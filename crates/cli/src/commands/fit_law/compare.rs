@@ -1,4 +1,4 @@
-//! Several laws on the same segments, by what Akaike's and the Bayesian criterion say of them.
+//! Comparison of several laws on the same segments, by Akaike's and the Bayesian criterion.
 
 use serde::Serialize;
 
@@ -14,13 +14,13 @@ use ohmstrain::number::{fixed, significant};
 /// Version of what `--json` prints.
 const SCHEMA: u32 = 1;
 
-/// What `--json` prints.
+/// Content of the output of `--json`.
 #[derive(Serialize)]
 struct Json<'a> {
     ranked: &'a [Ranked],
 }
 
-/// What the criteria say of a law on a segment.
+/// Criteria of a law on a segment.
 #[derive(Serialize)]
 struct Ranked {
     recording: String,

@@ -19,7 +19,7 @@ use pieces::{Piece, pieces};
 
 /// A fitted piece of a recording.
 pub struct Fitted {
-    /// What was fitted to.
+    /// Piece of the recording that was fitted.
     pub piece: Piece,
     /// The fit.
     pub fit: ClosedFormFit,
@@ -27,11 +27,11 @@ pub struct Fitted {
 
 /// A recording and what was fitted to it.
 pub struct Fits {
-    /// What messages call it.
+    /// Name in messages.
     pub name: String,
-    /// What its metadata say it is made of.
+    /// Material by its metadata.
     pub material: Option<String>,
-    /// Length of the unstretched sensor, mm, where the metadata say it.
+    /// Length of the unstretched sensor, mm, if the metadata have it.
     pub gauge_length_mm: Option<f64>,
     /// Unit of the readings, `1` for a ratio.
     pub reading_unit: &'static str,

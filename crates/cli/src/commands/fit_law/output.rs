@@ -14,7 +14,7 @@ use ohmstrain::number::plain;
 /// Version of what `--json` prints.
 const SCHEMA: u32 = 1;
 
-/// What `--json` prints.
+/// Content of the output of `--json`.
 #[derive(Serialize)]
 struct Report<'a> {
     fits: Vec<FitReport<'a>>,
@@ -27,7 +27,7 @@ struct FitReport<'a> {
     segment: &'a str,
     phase: &'static str,
     law: String,
-    /// In equations 8 and 9.
+    /// Modulus in equations 8 and 9.
     modulus: Option<String>,
     from_s: f64,
     until_s: f64,
@@ -195,7 +195,7 @@ fn warn_of(recording: &Fits, law: &str, messages: &Messages) {
     }
 }
 
-/// What is doubtful about a fit, after its segment's name.
+/// Returns the name of a fit's segment and the doubts about the fit.
 fn doubts(Fitted { piece, fit }: &Fitted) -> (&str, Vec<String>) {
     let mut doubts = Vec::new();
     if fit.r_squared < POOR {

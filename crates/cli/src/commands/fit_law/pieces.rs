@@ -9,7 +9,7 @@ use crate::args::{FitLawArgs, SegmentChoice, phase_name};
 use crate::error::CliError;
 use crate::input::TraceFile;
 
-/// What one fit is about: a segment, or a movement with the hold after it.
+/// Piece for one fit: a segment, or a movement with the hold after it.
 pub struct Piece {
     /// Its segments, as `--segment` names them.
     pub label: String,
@@ -47,7 +47,7 @@ struct Numbered {
     number: usize,
 }
 
-/// What the arguments choose of a recording.
+/// Returns the pieces of a recording that the arguments choose.
 pub fn pieces(recording: &TraceFile, args: &FitLawArgs) -> Result<Vec<Piece>, CliError> {
     if args.segment.contains(&SegmentChoice::Whole) {
         return whole(recording, args).map(|piece| vec![piece]);
@@ -65,7 +65,7 @@ pub fn pieces(recording: &TraceFile, args: &FitLawArgs) -> Result<Vec<Piece>, Cl
     Ok(chosen)
 }
 
-/// Whether a law is about a phase.
+/// True if a law describes a phase.
 const fn is_about(law: ClosedForm, phase: Phase) -> bool {
     match law {
         ClosedForm::Eq8And9 => true,

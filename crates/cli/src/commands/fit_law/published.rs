@@ -6,7 +6,7 @@ use super::{Fits, Fitted, SAME_SPEED, output};
 use crate::messages::Messages;
 use ohmstrain::number::{fixed, plain};
 
-/// What one phase of one fit contributes.
+/// Contribution of one phase of one fit.
 struct Entry<'a> {
     material: &'a str,
     speed: Option<f64>,
@@ -40,7 +40,7 @@ pub fn table(recordings: &[Fits]) -> Rows {
     Rows { keys: 3, header, rows }
 }
 
-/// Says in which phase a law that describes both of its phases together does not describe one of them.
+/// Warns of a phase that a law does not describe, though it describes both of its phases together.
 pub fn warn(recordings: &[Fits], messages: &Messages) {
     for recording in recordings {
         for entry in entries(recording, false) {
@@ -96,7 +96,7 @@ fn entries(recording: &Fits, in_mm: bool) -> Vec<Entry<'_>> {
     out
 }
 
-/// A recording that does not say its material stands for itself.
+/// Returns the file's name, for a recording without a material, which stands for itself.
 fn file_name(path: &str) -> &str {
     path.rsplit(['/', '\\']).next().unwrap_or(path)
 }
@@ -110,7 +110,7 @@ fn r_squared(fitted: &Fitted, is_in: impl Fn(&Datum) -> bool) -> f64 {
     1.0 - both().map(|(_, residual)| residual * residual).sum::<f64>() / about_mean
 }
 
-/// Whether a parameter is about a phase: what belongs to the hold stands in its row, time constants and shares in both.
+/// True if a parameter belongs to a phase: those of the hold are in its row, time constants and shares in both.
 fn belongs(name: &str, phase: &str) -> bool {
     let of_hold = ["r0_hold", "r1_hold", "r_start", "r_settled"].iter().any(|start| name.starts_with(start));
     let of_movement = name == "r0"

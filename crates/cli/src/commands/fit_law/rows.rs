@@ -19,12 +19,12 @@ pub enum Cell {
     AtLimit(f64),
     /// The readings do not tell it.
     NotTold,
-    /// There is none.
+    /// No parameter.
     Nothing,
 }
 
 impl Cell {
-    /// What a fit says of a parameter.
+    /// Returns the cell of a fitted parameter.
     pub fn of(estimated: Option<&Estimated>) -> Self {
         match estimated {
             None => Self::Nothing,
@@ -64,7 +64,7 @@ impl From<String> for Cell {
 
 /// A table.
 pub struct Rows {
-    /// Leading columns that say what a row is about.
+    /// Number of leading columns that identify a row.
     pub keys: usize,
     pub header: Vec<String>,
     pub rows: Vec<Vec<Cell>>,
@@ -125,7 +125,7 @@ impl Rows {
         blocks
     }
 
-    /// With a column of standard errors behind that of each parameter.
+    /// Formats it as CSV with a column of standard errors behind that of each parameter.
     fn csv(&self) -> String {
         let is_estimate = |row: &Vec<Cell>, column: usize| matches!(row.get(column), Some(Cell::Estimate(..)));
         let has_error = |column: usize| self.rows.iter().any(|row| is_estimate(row, column));

@@ -24,16 +24,16 @@ pub struct Description {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Joint {
-    /// Of its columns in the output.
+    /// Name of its columns in the output.
     pub name: String,
-    /// Of its readings in the recording.
+    /// Name of its readings' column in the recording.
     pub column: String,
     /// The sensor's file, from the description's folder.
     pub sensor: PathBuf,
     /// The joint that the sensor spans, unless the sensor knows.
     #[serde(default, deserialize_with = "spec")]
     pub joint: Option<JointSpec>,
-    /// What the rested sensor reads today.
+    /// Reading of the rested sensor today.
     pub rest_resistance: Option<f64>,
     /// Electronics, if the column has converter codes.
     #[serde(default, deserialize_with = "spec")]
@@ -49,7 +49,7 @@ impl Description {
     /// Reads the file.
     ///
     /// # Errors
-    /// If it cannot be read, or says something that nobody understands.
+    /// If it cannot be read, or has an unknown field.
     pub fn read(path: &Path) -> Result<Self, CliError> {
         let name = path.display();
         let text = whole_file::text(path)?;

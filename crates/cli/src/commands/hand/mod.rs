@@ -21,7 +21,7 @@ use crate::suits::FIRST_LIVE_READINGS;
 use crate::whole_file::is_stdin;
 use description::{Description, Joint};
 
-/// What helps where a clock has started again.
+/// Advice for a clock that has restarted.
 const LATE: &str = "; if the clock has started again there, --skip-bad goes on with other filters";
 
 /// Longer lines are no rows, however they go on.
@@ -53,7 +53,7 @@ pub fn run(args: &HandArgs, messages: &Messages) -> Result<(), CliError> {
     rows_out.publish()
 }
 
-/// True if somebody waits for each row.
+/// True if a reader waits for each row.
 fn is_live(args: &HandArgs) -> bool {
     is_stdin(&args.trace_file) || !args.trace_file.is_file()
 }
@@ -129,7 +129,7 @@ impl<'a> Channel<'a> {
         Ok(())
     }
 
-    /// What the electronics, the lines above the header or the end of the column's name say that the readings are.
+    /// Returns the unit of the readings by the electronics, the lines above the header or the end of the column's name.
     fn said_unit(&self) -> Option<ReadingUnit> {
         if self.joint.front_end.is_some() || self.lines.metadata().resistance_unit.is_some() {
             return Some(ReadingUnit::Ohm);
@@ -264,7 +264,7 @@ fn stream<W: Write>(
     Ok(())
 }
 
-/// Warns of a doubt where somebody waits for the rows, refuses the recording otherwise.
+/// Warns of a doubt if a reader waits for the rows, and refuses the recording otherwise.
 fn say(doubt: Option<String>, file: &str, live: bool, messages: &Messages) -> Result<(), CliError> {
     match doubt {
         Some(doubt) if live => messages.warning(&format!("{file}: {doubt}")),

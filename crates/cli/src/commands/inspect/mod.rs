@@ -12,7 +12,7 @@ use crate::input;
 use crate::lab_files;
 use crate::output::print;
 
-/// What `inspect` found.
+/// Findings of `inspect`.
 pub struct Findings {
     /// The files.
     pub tables: Vec<Table>,
@@ -26,15 +26,15 @@ pub struct Proposal {
     pub plan: Plan,
     /// Its command.
     pub command: String,
-    /// What it remarks.
+    /// Remarks of the plan.
     pub remarks: Vec<String>,
-    /// What the trace looks like.
+    /// Survey of the trace.
     pub survey: Survey,
-    /// What to do with the file where it is a trace already: importing it changes nothing.
+    /// Advice on a file that is a trace already: importing it changes nothing.
     pub next: Option<String>,
 }
 
-/// Says what stands in a lab's files, and how to import them.
+/// Describes the contents of a lab's files, and the import that fits them.
 pub fn run(args: &InspectArgs) -> Result<(), CliError> {
     let recipe = args.known.recipe();
     args.files.iter().try_for_each(|path| lab_files::refuse_results(path))?;

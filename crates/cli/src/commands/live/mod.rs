@@ -26,9 +26,9 @@ use crate::sensor_file;
 use session::Session;
 pub use source::{Event, Source};
 
-/// How long rows are taken before anything else is looked at.
+/// Time for which rows are taken before anything else is done.
 const TAKEN_FOR: Duration = Duration::from_millis(20);
-/// How long a key is waited for.
+/// Time for which a key is waited for.
 const KEY_WAIT: Duration = Duration::from_millis(10);
 /// Time between two drawings.
 const FRAME: Duration = Duration::from_millis(50);
@@ -75,7 +75,7 @@ pub fn run(args: &LiveArgs, messages: &Messages) -> Result<(), CliError> {
 /// Holds a recording back to the pace at which it was recorded.
 struct Pace {
     speed: f64,
-    /// When the first row was due, and its time.
+    /// Due time of the first row, and its own time.
     started: Option<(Instant, f64)>,
 }
 

@@ -45,7 +45,7 @@ pub fn listen_udp(address: &str, send: SyncSender<Event>) -> Result<(), CliError
     Ok(())
 }
 
-/// Sends the lines of a datagram, of which the last needs no end; whether anybody listens.
+/// Sends the lines of a datagram, of which the last needs no end; returns true while there is a receiver.
 fn datagram(mut bytes: &[u8], send: &SyncSender<Event>) -> bool {
     let mut lines = Lines::default();
     while !bytes.is_empty() {
@@ -59,7 +59,7 @@ fn datagram(mut bytes: &[u8], send: &SyncSender<Event>) -> bool {
 /// Connects to HOST:PORT again and again; or waits at :PORT for one sender after the other.
 ///
 /// # Errors
-/// If nobody can connect there.
+/// If the address cannot be bound.
 pub fn read_tcp(address: &str, send: SyncSender<Event>) -> Result<(), CliError> {
     if !address.starts_with(':') {
         let address = address.to_owned();
@@ -71,7 +71,7 @@ pub fn read_tcp(address: &str, send: SyncSender<Event>) -> Result<(), CliError> 
     Ok(())
 }
 
-/// Reads one connection after the other, for as long as anybody listens.
+/// Reads one connection after the other, as long as there is a receiver.
 fn take_turns(next: impl Fn() -> io::Result<TcpStream>, send: &SyncSender<Event>) {
     loop {
         let (read, away) = match next() {

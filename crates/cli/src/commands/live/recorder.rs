@@ -1,4 +1,4 @@
-//! What is written while the view runs: a trace with a column of marks.
+//! Recording while the view runs: a trace with a column of marks.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -14,7 +14,7 @@ const MOST_FILES: u32 = 10_000;
 /// A record that is being written.
 pub struct Recorder {
     rows: RowWriter<BufWriter<File>>,
-    /// Where to.
+    /// Path of the file.
     pub path: PathBuf,
     /// Rows so far.
     pub count: u64,

@@ -1,4 +1,4 @@
-//! What is known while the view runs: the filter, and what has become of the lines.
+//! State while the view runs: the filter, and the lines so far.
 
 use std::collections::VecDeque;
 use std::time::Instant;
@@ -19,7 +19,7 @@ use crate::suits::FIRST_LIVE_READINGS;
 const MOST_POINTS: usize = 1 << 16;
 /// A step this many times as long as steps usually are is a gap.
 const GAP: f64 = 5.0;
-/// Shorter pauses are not told, s.
+/// Shortest pause that is reported, s.
 const SILENCE_S: f64 = 2.0;
 /// Between lines that arrive at once, s: two digits above what is written.
 const LEAST_STEP_S: f64 = 1e-4;
@@ -77,11 +77,11 @@ pub struct Session<'a> {
     filter: Filter,
     watch: ValidityWatch,
     quiet: QuietWatch,
-    /// What the rested sensor reads, if that is not what it read in calibration.
+    /// Reading of the rested sensor, if it differs from that in calibration.
     rest: Option<f64>,
     /// The first known readings.
     early: Vec<f64>,
-    /// Where lines have no time: when they come.
+    /// Arrival times, for lines without a time.
     arrivals: Option<Arrivals>,
     usual_step_s: Option<f64>,
     new_mark: Option<u32>,
@@ -89,11 +89,11 @@ pub struct Session<'a> {
     /// Times of the marks, s.
     pub marks: VecDeque<f64>,
     pub last: Option<Estimate>,
-    /// When the last row was taken.
+    /// Time at which the last row was taken.
     taken: Option<Instant>,
     pub counts: Counts,
     pub recorder: Option<Recorder>,
-    /// The last thing that there was to say.
+    /// Last message.
     pub message: String,
 }
 
@@ -274,7 +274,7 @@ impl<'a> Session<'a> {
         self.usual_step_s.filter(|step_s| *step_s > 0.0).map(f64::recip)
     }
 
-    /// How long ago the last row came, s, where that is longer than rows usually take.
+    /// Returns the time since the last row, s, if it is longer than usual.
     pub fn silent_s(&self) -> Option<f64> {
         let longest_s = SILENCE_S.max(GAP * self.usual_step_s.unwrap_or(0.0));
         self.taken.map(|taken| taken.elapsed().as_secs_f64()).filter(|silent_s| *silent_s > longest_s)

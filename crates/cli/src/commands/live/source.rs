@@ -1,4 +1,4 @@
-//! Where lines come from: a serial port, a pipe, stdin, or a recording. A thread reads, so that the view never waits.
+//! Sources of lines: a serial port, a pipe, stdin, or a recording. A thread reads, so that the view never waits.
 
 use std::fs::File;
 use std::io::{self, ErrorKind, IsTerminal, Read, Seek};
@@ -14,11 +14,11 @@ use crate::whole_file::is_stdin;
 const WAITING: usize = 1 << 12;
 /// A line is cut here, and the rest of it dropped: nothing that a device sends is that long.
 const LONGEST_LINE: usize = 1 << 13;
-/// How long a read of a port waits, and how long a port that is gone is left alone.
+/// Timeout of a read of a port, and the pause before a port that is gone is tried again.
 const READ_TIMEOUT: Duration = Duration::from_millis(100);
 pub(super) const RETRY: Duration = Duration::from_millis(300);
 
-/// What a source says.
+/// Event of a source.
 pub enum Event {
     /// A line without its end, and when it arrived.
     Line(Vec<u8>, Instant),
@@ -26,15 +26,15 @@ pub enum Event {
     Connected,
     /// The port is gone, or not there yet; why.
     Away(String),
-    /// There is no more.
+    /// End of the source.
     Ended,
 }
 
 /// A source of lines.
 pub struct Source {
-    /// What it says.
+    /// Events of the source.
     pub events: Receiver<Event>,
-    /// Whether it is a file, which has to be held back to the pace at which it was recorded.
+    /// True if it is a file, which has to be held back to the pace at which it was recorded.
     pub is_recording: bool,
 }
 
@@ -100,7 +100,7 @@ fn is_pipe(_: &Path) -> bool {
     false
 }
 
-/// Reads for as long as anybody listens.
+/// Reads as long as there is a receiver.
 pub(super) fn read_to_end(source: &mut dyn Read, send: &SyncSender<Event>) -> Result<(), SendError<Event>> {
     let mut lines = Lines::default();
     send.send(Event::Connected)?;
@@ -131,7 +131,7 @@ fn read_pipe(path: &Path, send: &SyncSender<Event>) {
     }
 }
 
-/// Reads a serial port for as long as anybody listens, and opens it again when it comes back.
+/// Reads a serial port as long as there is a receiver, and opens it again when it comes back.
 fn read_port(path: &Path, baud: u32, send: &SyncSender<Event>) {
     let name = path.to_string_lossy();
     loop {
@@ -157,9 +157,9 @@ fn read_port(path: &Path, baud: u32, send: &SyncSender<Event>) {
     }
 }
 
-/// Why reading stopped.
+/// Reason why reading stopped.
 pub(super) enum Stop {
-    /// Nobody listens.
+    /// No receiver any more.
     Unheard,
     /// The source failed.
     Failed(io::Error),
@@ -175,7 +175,7 @@ impl From<SendError<Event>> for Stop {
 #[derive(Default)]
 pub(super) struct Lines {
     begun: Vec<u8>,
-    /// What comes until the end of the line is the rest of one that was cut.
+    /// True if the bytes up to the end of the line are the rest of a line that was cut.
     is_cut: bool,
 }
 

@@ -1,4 +1,4 @@
-//! What to record, and what it will be worth, before anything has been recorded: simulated with a sensor's own law.
+//! Plan of a recording, and its worth, before anything has been recorded: simulated with a sensor's own law.
 
 mod motion;
 mod worth;
@@ -25,13 +25,13 @@ use worth::{Sampling, Told, Worth};
 /// Version of what `--json` prints.
 const SCHEMA: u32 = 1;
 
-/// What `--json` prints.
+/// Content of the output of `--json`.
 #[derive(Serialize)]
 struct Json<'a> {
     sensor: String,
     recordings: &'a [Told],
     sampling: &'a [Worth],
-    /// At the fastest of these rates.
+    /// Errors at the fastest of these rates.
     drift_alone_percent: f64,
     noise_alone_percent: f64,
     neither_percent: f64,
@@ -153,7 +153,7 @@ fn text(sensor: &Sensor, name: &str, protocols: &Protocols, told: &[Told], worth
     text
 }
 
-/// What no way of sampling mends.
+/// Describes the errors that no way of sampling reduces.
 fn floor(worth: &Sampling) -> String {
     let Sampling { drift_alone_percent, noise_alone_percent, neither_percent, .. } = worth;
     let shown = |percent: &f64| fixed(*percent, 1);

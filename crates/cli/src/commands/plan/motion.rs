@@ -23,7 +23,7 @@ pub struct Protocol {
     pub strain: Vec<f64>,
 }
 
-/// What all of them are made of.
+/// Common elements of the protocols.
 pub struct Protocols {
     low: f64,
     high: f64,
@@ -34,7 +34,7 @@ pub struct Protocols {
 }
 
 impl Protocols {
-    /// For a sensor's range, speeds and time constants.
+    /// Prepares protocols for a sensor's range, speeds and time constants.
     pub fn new(params: &SensorParams) -> Self {
         let range = params.law.range;
         let slowest_s = params.law.branches.iter().map(|branch| branch.tau_s).fold(1.0, f64::max);
@@ -56,7 +56,7 @@ impl Protocols {
         vec![one, several, held(SHORT_HOLD_S), held(hold_s)]
     }
 
-    /// What the sampling is judged by: all speeds, and short holds.
+    /// Returns the motion by which sampling is judged: all speeds, and short holds.
     pub fn usual(&self) -> Vec<f64> {
         self.with_holds(CYCLES / 2, SHORT_HOLD_S)
     }

@@ -1,4 +1,4 @@
-//! What recordings tell of a law's parameters, and what sampling and converters leave of an estimate.
+//! Information of recordings about a law's parameters, and errors of an estimate by sampling and converters.
 
 use nalgebra::DMatrix;
 use ohmstrain::{JointParams, Reading, ReadingUnit, Sensor};
@@ -21,9 +21,9 @@ pub const FASTEST_HZ: f64 = 50.0;
 const FINEST_HZ: f64 = 100.0;
 /// Bits of a converter; 0 for readings as good as the sensor.
 pub const BITS: [u32; 4] = [0, 12, 10, 8];
-/// Draws of noise and drift; the median of their errors is stated. One that leads the filter astray says little about sampling.
+/// Draws of noise and drift; the median of their errors is stated. One that leads the filter astray is no measure of sampling.
 const DRAWS: u64 = 5;
-/// A parameter is told if its standard error is less than this share of it.
+/// Largest standard error of a parameter that counts as determined, as a share of it.
 const TOLD: f64 = 0.25;
 /// An error is hardly larger than another one up to this factor.
 const HARDLY: f64 = 1.1;
@@ -34,24 +34,24 @@ const STEP: f64 = 1e-5;
 /// Seconds in which a filter finds its feet, which are not scored.
 const SETTLING_S: f64 = 5.0;
 
-/// What a recording tells.
+/// Information of a recording.
 #[derive(Serialize)]
 pub struct Told {
     pub protocol: String,
     pub minutes: f64,
     /// Parameters of the law.
     pub parameters: usize,
-    /// Those with a standard error of less than a quarter of them.
+    /// Number of parameters with a standard error of less than a quarter of them.
     pub told: usize,
-    /// The largest standard error of those that are told, percent.
+    /// Largest standard error of the determined parameters, percent.
     pub worst_percent: Option<f64>,
     /// Condition number of the Fisher information, its diagonal scaled to one.
     pub condition: f64,
-    /// The parameter that is told least, if any is not.
+    /// Parameter with the least information, if any is undetermined.
     pub left_open: String,
 }
 
-/// What a way of sampling leaves.
+/// Errors with one way of sampling.
 #[derive(Serialize)]
 pub struct Worth {
     pub rate_hz: f64,
@@ -64,15 +64,15 @@ pub struct Worth {
     pub angle_deg: Option<f64>,
 }
 
-/// What ways of sampling leave, and what none of them mends.
+/// Errors with several ways of sampling, and those that none of them reduces.
 #[derive(Serialize)]
 pub struct Sampling {
     pub cases: Vec<Worth>,
     /// Error at [`FASTEST_HZ`] of readings that drift and have no noise otherwise, percent of the sensor's range.
     pub drift_alone_percent: f64,
-    /// And of such that have noise and do not drift.
+    /// Error of readings that have noise and do not drift.
     pub noise_alone_percent: f64,
-    /// And of such that have neither.
+    /// Error of readings that have neither.
     pub neither_percent: f64,
 }
 
@@ -93,14 +93,14 @@ pub fn best(recordings: &[Told]) -> Option<&Told> {
     recordings.iter().filter(|one| one.told == most).min_by(|a, b| a.minutes.total_cmp(&b.minutes))
 }
 
-/// What is made of each kind of noise, relative to what the calibration found.
+/// Factors on each kind of noise, relative to the calibration.
 #[derive(Clone, Copy)]
 struct Disturbed {
     drift: f64,
     white: f64,
 }
 
-/// As the calibration found it.
+/// Noise of the calibration.
 const AS_FOUND: Disturbed = Disturbed { drift: 1.0, white: 1.0 };
 
 /// The sensor's drift, the same one however it is sampled: shares of R₀, [`FINEST_HZ`] of them a second.
@@ -139,7 +139,7 @@ fn times(rows: usize, rate_hz: f64) -> Vec<f64> {
     (0..rows).map(|row| row as f64 / rate_hz).collect()
 }
 
-/// What a recording tells of the law's parameters: their Fisher information, at the sensor's own values.
+/// Computes a recording's information about the law's parameters: their Fisher information, at the sensor's own values.
 pub fn told(sensor: &Sensor, protocol: &Protocol) -> Told {
     let minutes = protocol.strain.len() as f64 / RATE_HZ / 60.0;
     let (names, values) = parameters(&sensor.params().law);
@@ -204,7 +204,7 @@ fn information(sensor: &Sensor, strain: &[f64]) -> DMatrix<f64> {
     jacobian.tr_mul(&jacobian)
 }
 
-/// What rates and converters leave of the estimate, all on one motion with the same drifts.
+/// Computes the errors of the estimate for rates and converters, all on one motion with the same drifts.
 pub fn sampling(sensor: &Sensor, protocols: &Protocols) -> Result<Sampling, CliError> {
     let (path, mut cases) = (protocols.usual(), Vec::new());
     for rate_hz in RATES_HZ {

@@ -19,7 +19,7 @@ use crate::suits;
 use rows::RelativeRows;
 use table::Refinement;
 
-/// What nobody must overlook.
+/// Warning for every user.
 const TRUST: &str = "the likelihood of readings trusts the law: where the law is wrong, intervals of strain are too \
                      narrow; where a reference exists, use calibrate";
 
@@ -83,7 +83,7 @@ fn refine(
     Ok(Refinement { start, free, before, found, profiles })
 }
 
-/// Where the search starts, and the parameters that it moves.
+/// Returns the start of the search, and the parameters that it moves.
 fn start(
     args: &RefineArgs,
     params: &SensorParams,
@@ -115,7 +115,7 @@ fn movable(law: &LawParams, start: &NoiseStart) -> Vec<NoiseParameter> {
     NoiseParameter::ALL.into_iter().filter(is_movable).collect()
 }
 
-/// Says what of the recording was left aside.
+/// Reports the parts of the recording that were not used.
 fn remark_on_input(recording: &TraceFile, rows: &RelativeRows, params: &SensorParams, messages: &Messages) {
     if let Some(quantity) = recording.quantity() {
         let (header, name) = (&recording.header, quantity.name());

@@ -13,11 +13,11 @@ pub struct RelativeRows {
     pub time_s: Vec<f64>,
     /// R/R₀ − 1; NaN where missing.
     pub value: Vec<f64>,
-    /// What the electronics add to each reading, standard deviation relative to R₀.
+    /// Noise of the electronics in each reading, standard deviation relative to R₀.
     pub extra_sd: Vec<f64>,
     /// Rows before thinning.
     pub all: usize,
-    /// Every how many-th row is used.
+    /// Stride: one row in `stride` is used.
     pub stride: usize,
 }
 

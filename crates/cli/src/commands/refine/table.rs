@@ -5,7 +5,7 @@ use ohmstrain_calib::likelihood::{Bound, NoiseFit, NoiseParameter, NoiseStart, P
 use crate::error::CliError;
 use crate::output;
 
-/// All that `refine` found.
+/// Results of `refine`.
 pub struct Refinement {
     /// Noise and motion of the sensor file.
     pub start: NoiseStart,

@@ -1,4 +1,4 @@
-//! Where results are needed: everywhere, or on one way of a choice only.
+//! Scopes in which results are needed: everywhere, or on one way of a choice only.
 
 use ohmstrain_ekf::record::{Operation, Place};
 
@@ -7,7 +7,7 @@ const WORTH: usize = 10;
 
 /// The ways of choices, and on which of them each result is needed.
 pub struct Scopes {
-    /// Of each operation that is needed; the first scope is the whole function.
+    /// Scope of each operation that is needed; the first scope is the whole function.
     of: Vec<usize>,
     /// The scope around each.
     around: Vec<usize>,
@@ -27,7 +27,7 @@ pub struct Branch {
 }
 
 impl Scopes {
-    /// Of what is used so often, and gives these results.
+    /// Finds the scopes of operations, given how often each is used and the results.
     pub fn new(operations: &[Operation], uses: &[usize], results: &[Place]) -> Self {
         let all = Self::of_all(operations, uses, results, |_| true);
         let costs = all.costs(operations, uses);
@@ -36,7 +36,7 @@ impl Scopes {
         })
     }
 
-    /// With branches at these choices.
+    /// Finds the scopes with branches at the choices for which `worth` holds.
     fn of_all(operations: &[Operation], uses: &[usize], results: &[Place], worth: impl Fn(Place) -> bool) -> Self {
         let (of, branch) = (vec![0; operations.len()], vec![None; operations.len()]);
         let mut scopes = Self { of, around: vec![0], branch, branches: Vec::new() };

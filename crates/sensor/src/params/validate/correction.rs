@@ -59,7 +59,7 @@ impl CorrectionScale {
 }
 
 impl CorrectorParams {
-    /// Of a corrector with so many inputs.
+    /// Checks a corrector with that number of inputs.
     fn validate(&self, table: &Table, inputs: usize, rows: usize) -> Result<(), FieldError> {
         table.number("sd_scale", self.sd_scale, FACTOR)?;
         table.number("strain_sd", self.strain_sd, POSITIVE)?;
@@ -100,7 +100,7 @@ impl InputScales {
 }
 
 impl ProcessParams {
-    /// Of a process that may see these inputs, and has to see one of them first.
+    /// Checks a process that may use these inputs, and must use one of them first.
     fn validate(
         &self,
         table: &Table,

@@ -6,7 +6,7 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("field `{field}`: expected {expected}, found {found}")]
 pub struct FieldError {
-    /// Where it stands: names of tables and index in an array, `law.branches[0].tau_s`.
+    /// Path of the field: names of tables and index in an array, `law.branches[0].tau_s`.
     pub field: String,
     /// Expected values.
     pub expected: String,
@@ -48,9 +48,9 @@ pub const SHARE: Allowed = Allowed { least: 0.0, most: 1.0 };
 pub const FACTOR: Allowed = Allowed { least: 1e-3, most: 1e3 };
 /// Weights of training rows, and entries of matrices made of them.
 pub const WEIGHT: Allowed = Allowed { least: -1e15, most: 1e15 };
-/// Number that is told and not used: a score, or a variance of what was not determined.
+/// Number for information only: a score, or a variance of undetermined parameters.
 pub const TOLD: Allowed = Allowed { least: -f64::INFINITY, most: f64::INFINITY };
-/// The same for what is no less than zero.
+/// Number for information only, zero or more.
 pub const TOLD_AMOUNT: Allowed = Allowed { least: 0.0, most: f64::INFINITY };
 
 /// Largest change of resistance, relative to R₀, that a gauge curve may tell within the law's range.
@@ -95,7 +95,7 @@ impl Table {
         FieldError { field: self.0.clone(), expected, found }
     }
 
-    /// That a number is allowed.
+    /// Checks that a number is allowed.
     ///
     /// # Errors
     /// Names the field, if not.
@@ -107,7 +107,7 @@ impl Table {
         Err(self.wrong(name, format!("{} to {}", short(least), short(most)), short(value)))
     }
 
-    /// That all numbers are.
+    /// Checks that all numbers are allowed.
     ///
     /// # Errors
     /// Names the field, if not.
@@ -117,7 +117,7 @@ impl Table {
         wrong.map_or(Ok(()), |(index, value)| self.number(&format!("{name}[{index}]"), *value, allowed))
     }
 
-    /// That an array has the expected length.
+    /// Checks that an array has the expected length.
     ///
     /// # Errors
     /// Names the field, if not.

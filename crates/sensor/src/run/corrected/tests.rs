@@ -24,7 +24,7 @@ use crate::run::{Filter, Output, Rows, SEGMENT, WayBack};
 
 const LIMITS: RangeParams = RangeParams { lower: 0.0, upper: 0.4 };
 
-/// Says of every row what its time says, less surely the longer no reading has come.
+/// Returns an output whose strain is a function of time, with a variance that grows with the time since the last reading.
 fn says(time_s: f64, gap: f64, verdict: ReadingVerdict) -> Output {
     let known = |mean: f64| Gaussian { mean, variance: 1e-4 };
     let strain = Gaussian { mean: 0.2 + 0.15 * (0.3 * time_s).sin(), variance: 1e-4 * (1.0 + gap) };
@@ -66,7 +66,7 @@ fn reading(time_s: f64) -> Reading<f64> {
     Reading::from(0.25 + 0.28 * (0.3 * time_s + 0.2).sin() + 0.02 * (2.1 * time_s).sin())
 }
 
-/// What has been seen up to a row.
+/// Features of the readings up to a row.
 type Seen = Option<[f64; FEATURES]>;
 
 /// Features of the past, or of the future of times in falling order.
@@ -221,7 +221,7 @@ fn law_and_estimator() -> (LawParams, EstimatorParams) {
     (law, estimator)
 }
 
-/// That filter, corrected or not, with or without a gate.
+/// Builds that filter, corrected or not, with or without a gate.
 fn live(learned: Option<&Arc<Learned>>, gate: Option<f64>) -> Box<dyn Filter> {
     let (law, estimator) = law_and_estimator();
     let guard = gate.map_or_else(Guard::none, |gate| Guard::none().with_gate(gate, 5).unwrap());
@@ -241,8 +241,8 @@ fn broken_recording() -> Vec<(f64, Option<Reading<f64>>)> {
     (0..600).map(row).collect()
 }
 
-/// What is expected of a corrected filter from the bare one beside it: where a reading is missing, or turned down, the features stay
-/// and the variance grows with the filter's; innovations of rows before, fading with 20 s, widen it, in the naive sum.
+/// Compares a corrected filter with the bare one beside it: where a reading is missing, or rejected, the features stay and the
+/// variance grows with the filter's; innovations of earlier rows, fading with 20 s, widen it, in the naive sum.
 #[test]
 fn a_corrected_filter_says_what_the_bare_one_beside_it_and_its_readings_say() {
     let learned = Learned::new(&params(), LIMITS);
@@ -286,7 +286,7 @@ fn a_corrected_filter_says_what_the_bare_one_beside_it_and_its_readings_say() {
     assert_eq!(rejected, 2);
 }
 
-/// With a fixed lag every row comes out once and in order, mixed with what was said of it when it came, whatever rows were
+/// Tests that with a fixed lag every row comes out once and in order, mixed with its first estimate, whatever rows were
 /// refused in between.
 #[test]
 fn a_lagged_row_is_mixed_with_what_was_said_of_it() {
