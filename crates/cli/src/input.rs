@@ -28,6 +28,8 @@ pub struct TraceFile {
     pub first_row: usize,
     /// Its contents.
     pub trace: Trace,
+    /// Standard deviations of the reference; empty if it is exact.
+    pub reference_sd: Vec<f64>,
 }
 
 /// Opens a recording for reading row by row; `-` is stdin.
@@ -96,7 +98,7 @@ fn of_text<R: BufRead>(source: &mut R, path: &Path, overrides: &Metadata) -> Res
 
 fn collect<R: Read>(rows: TraceReader<R>, sha256: String) -> Result<TraceFile, CliError> {
     let (name, header) = (rows.file().to_string(), header(rows.file(), rows.line()));
-    Ok(TraceFile { name, header, sha256, first_row: 0, trace: Trace::collect(rows)? })
+    Ok(TraceFile { name, header, sha256, first_row: 0, trace: Trace::collect(rows)?, reference_sd: Vec::new() })
 }
 
 /// A source whose bytes are hashed as they are read.
@@ -153,7 +155,15 @@ impl TraceFile {
     /// Returns some of its rows, under the same name.
     pub fn rows(&self, rows: Range<usize>) -> Self {
         let (name, header, sha256) = (self.name.clone(), self.header.clone(), self.sha256.clone());
-        Self { name, header, sha256, first_row: self.first_row + rows.start, trace: self.trace.rows(rows) }
+        let reference_sd = self.reference_sd.get(rows.clone()).unwrap_or_default().to_vec();
+        Self {
+            name,
+            header,
+            sha256,
+            first_row: self.first_row + rows.start,
+            trace: self.trace.rows(rows),
+            reference_sd,
+        }
     }
 
     /// Returns the error that no row lies between these times.
@@ -180,8 +190,12 @@ impl TraceFile {
                 self.header
             )));
         };
-        Samples::new(&self.trace.time_s, &self.trace.readings.values, &reference.values)
-            .map_err(|error| CliError::Input(format!("{}: data {error}", self.name)))
+        let samples = Samples::new(&self.trace.time_s, &self.trace.readings.values, &reference.values);
+        let samples = match &self.reference_sd[..] {
+            [] => samples,
+            sd => samples.and_then(|samples| samples.with_strain_sd(sd)),
+        };
+        samples.map_err(|error| CliError::Input(format!("{}: data {error}", self.name)))
     }
 
     /// Time, s, and reading of a row.

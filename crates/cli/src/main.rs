@@ -12,6 +12,7 @@ mod estimates;
 mod filter_state;
 mod input;
 mod lab_files;
+mod marks;
 mod messages;
 mod output;
 mod parquet_table;

@@ -42,6 +42,8 @@ mod known_doubt;
 #[cfg(feature = "calibrate")]
 mod lag_doubt;
 #[cfg(feature = "calibrate")]
+mod marks;
+#[cfg(feature = "calibrate")]
 mod motion_doubt;
 mod pauses;
 #[cfg(feature = "calibrate")]
@@ -77,6 +79,8 @@ pub use known_doubt::{StartDoubt, UnusedKnown, unused_known};
 #[cfg(feature = "calibrate")]
 pub use lag_doubt::LagDoubt;
 #[cfg(feature = "calibrate")]
+pub use marks::marked_references;
+#[cfg(feature = "calibrate")]
 pub use motion_doubt::motion_doubts;
 #[cfg(feature = "calibrate")]
 pub use plausible::calibration_doubts;
@@ -98,8 +102,8 @@ pub use validity::{Beyond, Extrapolation, ValiditySeen, ValidityWatch};
 #[cfg(feature = "calibrate")]
 #[doc(no_inline)]
 pub use ohmstrain_calib::{
-    CalibrationError, Distrusted, Doubt, GaugeFamily, Identifiability, Lag, LagError, LeftOutRow, SamplesError,
-    ScoredRow, Stage, score,
+    CalibrationError, Distrusted, Doubt, GaugeFamily, Identifiability, Lag, LagError, LeftOutRow, Mark,
+    MarkedReference, MarksError, SamplesError, ScoredRow, Stage, score,
 };
 pub use ohmstrain_ekf::live::{FARTHEST_REST, Flag, Flags, KNOWN_BEYOND};
 #[doc(no_inline)]

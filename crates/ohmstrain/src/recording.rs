@@ -50,6 +50,22 @@ impl<'a> Recording<'a> {
         })
     }
 
+    /// Standard deviations of the true strains, as [`marked_references`](crate::marked_references()) has them: calibrated intervals cover
+    /// the reference's error, too.
+    ///
+    /// # Errors
+    /// If there are not as many as strains, or one of a known strain is negative or NaN.
+    ///
+    /// ```
+    /// let recording = ohmstrain::Recording::new(&[0.0, 0.1], &[1600.0, 1610.0], &[0.00, 0.01])?;
+    /// assert!(recording.with_strain_sd(&[0.002, 0.002]).is_ok());
+    /// assert!(recording.with_strain_sd(&[0.002, -0.1]).is_err());
+    /// # Ok::<(), ohmstrain::Error>(())
+    /// ```
+    pub fn with_strain_sd(self, strain_sd: &'a [f64]) -> Result<Self, Error> {
+        Ok(Self { samples: self.samples.with_strain_sd(strain_sd)?, ..self })
+    }
+
     /// The readings are ratios to some resistance at rest.
     ///
     /// ```

@@ -17,6 +17,7 @@ use crate::alignment;
 use crate::args::CalibrateArgs;
 use crate::error::CliError;
 use crate::input::{self, TraceFile, unit};
+use crate::marks::{self, MarksFile};
 use crate::messages::Messages;
 use crate::output::{Kind, Outputs, named, print};
 use crate::plausible;
@@ -67,7 +68,7 @@ impl Outcome {
 
 /// Calibrates a sensor on recordings and writes its parameters.
 pub fn calibrate(args: &CalibrateArgs, messages: &Messages) -> Result<Outcome, CliError> {
-    let mut outputs = Outputs::new(args.replace.force, args.traces.iter().chain(&args.prior));
+    let mut outputs = Outputs::new(args.replace.force, args.traces.iter().chain(&args.prior).chain(&args.marks));
     let sensor_output = outputs.claim(&args.output, Kind::Sensor)?;
     let wanted = Wanted::claim(&args.report, &mut outputs)?;
     let overrides = args.units.metadata();
@@ -85,8 +86,16 @@ pub fn calibrate(args: &CalibrateArgs, messages: &Messages) -> Result<Outcome, C
             kept.push((recordings.len() - 1, Kept { whole: recording, seen: rows }));
         }
     }
-    let lags_s = recordings.iter_mut().map(|recording| alignment::check(recording, args.align, args.explain, messages));
-    let lags_s: Vec<f64> = lags_s.collect::<Result<_, _>>()?;
+    let lags_s = if args.marks.is_empty() {
+        let lag = |recording: &mut TraceFile| alignment::check(recording, args.align, args.explain, messages);
+        recordings.iter_mut().map(lag).collect::<Result<Vec<_>, _>>()?
+    } else {
+        let files: Vec<MarksFile> = args.marks.iter().map(|path| MarksFile::read(path)).collect::<Result<_, _>>()?;
+        for remark in marks::take(&mut recordings, &files)? {
+            messages.remark(&remark);
+        }
+        vec![0.0; recordings.len()]
+    };
     let prior = args.prior.as_deref().map(fleet::read).transpose()?;
     let wished = calibration(args);
     let wished = prior.as_ref().map_or(wished, |prior| wished.prior(prior));
@@ -179,6 +188,7 @@ fn known_recordings<'a>(
     let known = |(recording, samples): (&'a TraceFile, &Samples<'a>)| {
         let (trace, metadata) = (&recording.trace, &recording.trace.metadata);
         let mut one = ohmstrain::Recording::new(samples.time_s(), samples.reading(), samples.strain())?;
+        one = if recording.reference_sd.is_empty() { one } else { one.with_strain_sd(&recording.reference_sd)? };
         one = one.of_file(file_name(&recording.name), &recording.sha256);
         one = if reading == ReadingUnit::Ratio { one.of_ratios() } else { one };
         one = if quantity == Quantity::AngleDeg { one.of_angles_deg() } else { one };
