@@ -11,6 +11,7 @@ mod identifiability;
 mod lag;
 mod likelihood;
 mod likelihood_sensor;
+mod marks;
 mod parameter_coverage;
 mod samples;
 

@@ -10,8 +10,8 @@ const STILL: f64 = 0.12;
 /// A hold lasts this fraction of the time between the marks before and after it at least, and four standard deviations of a mark's time.
 const LEAST_OF_GAP: f64 = 0.25;
 const LEAST_SDS: f64 = 4.0;
-/// While a body is held its sensor relaxes: the second half of what the reading does is less than this fraction of the first half, or
-/// all of it is less than this fraction of the readings' range. Readings that go on as they began are a slow move.
+/// Largest change of a hold's second half, as a fraction of the first half's, or of all of it, as a fraction of the readings' range: a
+/// held sensor relaxes. Readings that go on as they began are a slow move.
 const RELAXES: f64 = 0.6;
 const RESTS: f64 = 0.08;
 

@@ -33,11 +33,11 @@ impl Mark {
     }
 }
 
-/// Why marks give no reference. Marks count from zero.
+/// Fault of marks that give no reference. Marks count from zero.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum MarksError {
-    /// There are no two marks.
+    /// Fewer than two marks.
     #[error("expected at least two marks of different strains, found {found}")]
     TooFew {
         /// Number of marks.

@@ -53,7 +53,7 @@ impl Pace {
     }
 }
 
-/// How far readings have come from the first to the last, 0 to 1, never back; `None` if those differ by less than `least`.
+/// Progress of readings from the first to the last, 0 to 1, never back; `None` if those differ by less than `least`.
 fn reading_progress(readings: &[f64], least: f64) -> Option<Vec<f64>> {
     let few = (readings.len() / 50).max(1);
     let mean = |rows: &[f64]| rows.iter().sum::<f64>() / rows.len().max(1) as f64;
