@@ -29,6 +29,7 @@ mod interrupted;
 mod lab_files;
 mod live;
 mod manners;
+mod marks;
 mod outputs;
 mod own_files;
 mod pipeline;

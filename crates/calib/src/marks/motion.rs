@@ -10,7 +10,7 @@ use crate::samples::Samples;
 /// Standard deviation of a mark's time: a person's reaction, s.
 pub(crate) const TIME_SD_S: f64 = 0.2;
 /// Standard deviation of the ends of a hold that the readings show, s.
-const HOLD_SD_S: f64 = 0.3;
+const HOLD_SD_S: f64 = 0.6;
 /// Standard deviation of a mark's strain where none is stated, as a fraction of the marks' span.
 const STRAIN_SD: f64 = 0.02;
 /// Standard deviation of a move's shape in its middle, as a fraction of its distance.
