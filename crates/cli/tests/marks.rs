@@ -42,7 +42,7 @@ fn marks_make_a_sensor() {
 fn a_mark_that_is_wrong_is_named_and_nothing_is_written() {
     let bench = Bench::calibrated();
     without_reference(&bench);
-    let mut fails = |marks: &str, message: &str| {
+    let fails = |marks: &str, message: &str| {
         bench.write("marks.csv", marks);
         bench.run(&["calibrate", "readings.csv", "--marks", "marks.csv", "-o", "marked.toml"]).fails(4, message);
         assert!(!bench.path("marked.toml").exists());
