@@ -41,7 +41,7 @@ fn holds_are_found_and_the_motion_between_them() {
         .collect();
     let unknown = vec![f64::NAN; time_s.len()];
     let samples = Samples::new(&time_s, &ohm, &unknown).unwrap();
-    let found = marked_references(&[samples], &[marks.clone()]).unwrap().remove(0);
+    let found = marked_references(&[samples], std::slice::from_ref(&marks)).unwrap().remove(0);
     assert_eq!(found.holds, 20);
     let known: Vec<usize> = (0..time_s.len()).filter(|&k| found.strain[k].is_finite()).collect();
     let squares = known.iter().map(|&k| (found.strain[k] - truth[k]).powi(2)).sum::<f64>();
