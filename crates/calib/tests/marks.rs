@@ -71,6 +71,7 @@ fn the_mark_to_blame_is_named() {
         Err(ohmstrain_calib::CalibrationError::Marks { source, .. }) => source,
         other => panic!("{other:?}"),
     };
+    assert!(matches!(marked_references(&[recording], &[]), Err(ohmstrain_calib::CalibrationError::Unsupported(_))));
     assert_eq!(fault(&[Mark::new(1.0, 0.0)]), MarksError::TooFew { found: 1 });
     assert_eq!(fault(&[Mark::new(1.0, 0.1), Mark::new(2.0, 0.1)]), MarksError::OneStrain { strain: 0.1 });
     assert_eq!(fault(&[Mark::new(1.0, 0.0), Mark::new(99.0, 0.1)]).mark(), Some(1));

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use csv::{Position, Reader, StringRecord};
-use ohmstrain::{CalibrationError, Error, Mark, MarkedReference};
+use ohmstrain::{CalibrationError, Error, Mark, MarkedReference, MarksError};
 use ohmstrain_bench_data::{Reference, ReferenceQuantity};
 
 use crate::error::CliError;
@@ -48,11 +48,8 @@ impl MarksFile {
         Ok(file)
     }
 
-    /// A library's error with the file and the line that it is about.
-    fn named(&self, error: &CalibrationError) -> CliError {
-        let CalibrationError::Marks { source, .. } = error else {
-            return CliError::Input(format!("{}: {error}", self.name));
-        };
+    /// A fault with the file and the line that it is about.
+    fn named(&self, source: &MarksError) -> CliError {
         let line = source.mark().and_then(|mark| self.lines.get(mark)).map_or(String::new(), |line| format!(":{line}"));
         CliError::Input(format!("{}{line}: {source}", self.name))
     }
@@ -65,17 +62,19 @@ struct Columns {
     strain: usize,
     strain_name: &'static str,
     sd: Option<usize>,
+    sd_name: &'static str,
     quantity: ReferenceQuantity,
 }
 
 impl Columns {
     fn find(header: &StringRecord) -> Option<Self> {
         let place = |name: &str| header.iter().position(|column| column.trim() == name);
-        let of_quantity = |(name, sd, quantity): &(&'static str, &str, ReferenceQuantity)| {
-            Some((place(name)?, *name, place(sd), *quantity))
+        let of_quantity = |(strain_name, sd_name, quantity): &(&'static str, &'static str, ReferenceQuantity)| {
+            let (strain, sd) = (place(strain_name)?, place(sd_name));
+            let (time, until) = (place("time_s")?, place("until_s"));
+            Some(Self { time, until, strain, strain_name, sd, sd_name, quantity: *quantity })
         };
-        let (strain, strain_name, sd, quantity) = STRAINS.iter().find_map(of_quantity)?;
-        Some(Self { time: place("time_s")?, until: place("until_s"), strain, strain_name, sd, quantity })
+        STRAINS.iter().find_map(of_quantity)
     }
 
     /// A row's mark. An empty cell of an optional column stands for nothing known.
@@ -88,7 +87,7 @@ impl Columns {
             place.filter(|place| !cell(*place).is_empty()).map(|place| number(place, name)).transpose()
         };
         let mark = Mark::new(number(self.time, "time_s")?, number(self.strain, self.strain_name)?);
-        Ok(Mark { until_s: optional(self.until, "until_s")?, strain_sd: optional(self.sd, "strain_sd")?, ..mark })
+        Ok(Mark { until_s: optional(self.until, "until_s")?, strain_sd: optional(self.sd, self.sd_name)?, ..mark })
     }
 }
 
@@ -107,11 +106,10 @@ pub fn take(recordings: &mut [TraceFile], files: &[MarksFile]) -> Result<Vec<Str
     });
     let known = known.collect::<Result<Vec<_>, _>>()?;
     let marks: Vec<Vec<Mark>> = files.iter().map(|file| file.marks.clone()).collect();
+    let names: Vec<&str> = recordings.iter().map(|recording| recording.name.as_str()).collect();
     let found = ohmstrain::marked_references(&known, &marks).map_err(|error| match error {
-        Error::Calibration(error) => {
-            let recording = if let CalibrationError::Marks { recording, .. } = error { recording } else { 0 };
-            files[recording].named(&error)
-        }
+        Error::Calibration(CalibrationError::Marks { recording, source }) => files[recording].named(&source),
+        Error::Calibration(error) => CliError::calibration(&names, &error),
         other => other.into(),
     })?;
     let remarks = found.iter().zip(files).map(|(found, file)| file.remark(found)).collect();

@@ -61,13 +61,7 @@ pub(crate) fn fit_correction(
     rows.extend(chosen(&candidates, most).iter().map(rounded));
     let steps_s = recordings.iter().flat_map(|of| of.time_s.windows(2).map(|pair| pair[1] - pair[0]));
     let simulated = simulated_rows(fit, &MotionStats::new(recordings), &scale, median(steps_s).unwrap_or(0.0));
-    Ok(learn(
-        (corrects, scale),
-        rows,
-        CorrectorInputs { all, reference_sd: reference_sd(recordings), few: Columns::default() },
-        &simulated,
-        limits,
-    ))
+    Ok(learn((corrects, scale), rows, (all, reference_sd(recordings)), &simulated, limits))
 }
 
 /// Root mean square of the standard deviations that the recordings' references have.
@@ -81,12 +75,12 @@ fn reference_sd(recordings: &[Samples]) -> f64 {
 fn learn(
     (corrects, readings): (EstimatorKind, CorrectionScale),
     rows: Vec<TrainingRow>,
-    of_recordings: CorrectorInputs,
+    (all, reference_sd): (Option<AllOf>, f64),
     simulated: &[SimulatedRow],
     limits: RangeParams,
 ) -> Option<CorrectionParams> {
     let distilled = Distilled::fit(simulated, &rows, limits)?;
-    let inputs = CorrectorInputs { few: Columns::new(rows.iter()), ..of_recordings };
+    let inputs = CorrectorInputs { few: Columns::new(rows.iter()), all, reference_sd };
     let simulated = Prepared::new(inputs.of_filter(limits)).simulated(&distilled)?;
     let (filter, smoother) = rayon::join(
         || filter_corrector(inputs.of_filter(limits), &simulated),
@@ -111,7 +105,6 @@ struct AllOf {
     step_s: f64,
 }
 
-#[derive(Default)]
 struct Columns {
     filter: Vec<[f64; FILTER_INPUTS]>,
     smoother: Vec<[f64; SMOOTHER_INPUTS]>,

@@ -41,17 +41,25 @@ pub struct MarkedReference {
     pub moves: usize,
 }
 
-/// References for recordings whose strain is known at marks only; those in `recordings` are not looked at. Marks are in order of time.
+/// References for recordings whose strain is known at marks only; those in `recordings` are not looked at. There is a list of marks for each,
+/// in order of time.
 ///
 /// The common shape of the moves is the one with which an extended Kalman filter, calibrated on it, does best on quarters left out.
 ///
 /// # Errors
-/// [`CalibrationError::Marks`] if marks contradict each other or lie outside of their recording, and as
+/// [`CalibrationError::Unsupported`] if there are not as many lists as recordings, [`CalibrationError::Marks`] if marks contradict each
+/// other or lie outside of their recording, and as
 /// [`calibrate`](crate::calibrate()) if no law explains the motion.
 pub fn marked_references(
     recordings: &[Samples],
     marks: &[Vec<Mark>],
 ) -> Result<Vec<MarkedReference>, CalibrationError> {
+    if marks.len() != recordings.len() {
+        let (lists, recordings) = (marks.len(), recordings.len());
+        return Err(CalibrationError::Unsupported(format!(
+            "{lists} lists of marks for {recordings} recordings; expected one for each"
+        )));
+    }
     let mut ranges = Vec::with_capacity(recordings.len());
     for (recording, (samples, marks)) in recordings.iter().zip(marks).enumerate() {
         let in_recording = |source| CalibrationError::Marks { recording, source };
