@@ -33,16 +33,7 @@ export class Folder {
 
   /** Runs the program; what it prints. */
   run(...args: string[]): string {
-    return this.runWith(sameLibm, args);
-  }
-
-  /** Runs the program with the system's elementary functions. */
-  runAsItIs(...args: string[]): string {
-    return this.runWith(process.env, args);
-  }
-
-  private runWith(env: NodeJS.ProcessEnv, args: string[]): string {
-    return execFileSync(program as string, args, { cwd: this.path, env, encoding: "utf8", stdio: ["ignore", "pipe", "pipe"] });
+    return execFileSync(program as string, args, { cwd: this.path, env: sameLibm, encoding: "utf8", stdio: ["ignore", "pipe", "pipe"] });
   }
 
   /** Runs the program, which fails; what it says of that. */
@@ -77,15 +68,6 @@ export function nasty(trace: string, gaugeLengthMm: number): Uint8Array {
   const head = ["Prüfstand 3, Dehnungssensor Nr. 7", "Prüfer: Müller", "", "Zeit;Widerstand;Weg;Bemerkung", "s;kΩ;mm;"];
   const text = [...head, ...lines.slice(1).map(row)].join("\r\n") + "\r\n";
   return Buffer.from(text, "utf8");
-}
-
-/** The largest difference between the numbers of two texts, relative to their size; infinite if anything else differs. */
-export function largestDifference(one: string, other: string): number {
-  const number = /-?\d+(?:\.\d+)?(?:e-?\d+)?/g;
-  if (one.replace(number, "") !== other.replace(number, "")) return Number.POSITIVE_INFINITY;
-  const [ours, theirs] = [one, other].map((text) => (text.match(number) ?? []).map(Number)) as [number[], number[]];
-  const differences = ours.map((value, k) => Math.abs(value - (theirs[k] ?? 0)) / Math.max(Math.abs(value), 1e-9));
-  return Math.max(0, ...differences);
 }
 
 /** Lines of a closing, with no seconds: those are another machine's every time. */
