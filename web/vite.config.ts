@@ -24,5 +24,5 @@ export default defineConfig({
   plugins: [wasmAsText(), viteSingleFile({ removeViteModuleLoader: true })],
   build: { target: "es2022", assetsInlineLimit: Number.MAX_SAFE_INTEGER, chunkSizeWarningLimit: 10_000 },
   worker: { format: "iife" },
-  test: { include: ["tests/**/*.test.ts"], testTimeout: 240_000, hookTimeout: 120_000, fileParallelism: false },
+  test: { include: ["tests/**/*.test.ts"], testTimeout: 900_000, hookTimeout: 120_000, fileParallelism: false },
 });

@@ -39,7 +39,7 @@ test("a nasty lab file becomes a calibrated sensor and firmware, all as the comm
   expect(trace.equals(folder.get("trace.csv"))).toBe(true);
 
   await page.locator("#start").click();
-  await page.locator("#verdict").waitFor({ timeout: 200_000 });
+  await page.locator("#verdict").waitFor({ timeout: 600_000 });
   const closing = folder.run("calibrate", "trace.csv", "-o", "sensor.toml", "--report", "report.html", "--figures", "figures");
   expect(withoutSeconds(await lines(page, "#verdict"))).toBe(withoutSeconds(closing));
   const toml = await download(page, () => page.locator("#save-sensor").click());

@@ -12,6 +12,12 @@ pub enum CalibrationError {
     /// No recording to calibrate on.
     #[error("no recording with a known strain was given")]
     NoRecording,
+    /// Channels that cannot be fused.
+    #[error(
+        "channels of one strain: expected two or more with the same times, and in each quarter of a recording rows with readings of \
+         all of them and a known strain"
+    )]
+    NoCommonRows,
     /// A recording is too short.
     #[error(
         "recording {} has {complete} rows with reading and reference, at least {needed} are needed",

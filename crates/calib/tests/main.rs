@@ -7,6 +7,7 @@ mod closed_form_laws;
 mod closed_form_nist;
 mod closed_form_recovery;
 mod crps;
+mod fusion;
 mod identifiability;
 mod lag;
 mod likelihood;

@@ -6,6 +6,7 @@
 
 mod alignment;
 mod args;
+mod channels;
 mod commands;
 mod error;
 mod estimates;

@@ -37,6 +37,11 @@ pub fn is_hand(text: &str) -> bool {
     is_one(text.as_bytes()) && text.lines().any(|line| line.trim() == "[[joints]]")
 }
 
+/// True if a file is the description of a hand.
+pub fn is_of_a_hand(path: &Path) -> bool {
+    path.is_file() && whole_file::text(path).is_ok_and(|text| is_hand(&text))
+}
+
 /// True if this is a recording: its first line that is no comment has names of columns.
 pub fn is_recording(text: &str) -> bool {
     let first = text.lines().find(|line| !line.trim().is_empty() && !line.starts_with('#')).unwrap_or("");

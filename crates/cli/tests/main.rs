@@ -7,6 +7,7 @@ mod bad_input;
 mod batch;
 mod browser;
 mod calibration_input;
+mod channels;
 mod closing;
 mod estimates;
 mod estimators;

@@ -87,6 +87,14 @@ pub enum Error {
         /// Quantity of the recordings' reference.
         found: Quantity,
     },
+    /// Another number of channels than a fusion has.
+    #[error("expected {expected} channels, those of the fusion, found {found}")]
+    OtherChannels {
+        /// Number of channels of the fusion.
+        expected: usize,
+        /// Number of sensors, filters or readings.
+        found: usize,
+    },
     /// Slices of different lengths.
     #[error("{times} times and {readings} readings; expected as many of each")]
     Lengths {

@@ -178,6 +178,11 @@ impl Filter {
         Ok(Stored::new(&self.kernel.made_of, None, last, Vec::new(), self.kernel.store()?))
     }
 
+    /// R₀ in the unit of the readings.
+    pub(crate) const fn rest_reading(&self) -> f64 {
+        self.kernel.rows.scale.rest_reading
+    }
+
     pub(crate) fn resume(&mut self, stored: &Stored) -> Result<(), Error> {
         stored.check(&self.kernel.made_of, None)?;
         self.kernel.resume(stored.kernel.clone())?;

@@ -37,6 +37,7 @@ mod estimate;
 #[cfg(feature = "calibrate")]
 mod explain;
 mod filter;
+mod fused;
 mod known;
 mod known_doubt;
 #[cfg(feature = "calibrate")]
@@ -74,6 +75,9 @@ pub use estimate::Estimate;
 #[cfg(feature = "calibrate")]
 pub use explain::explain;
 pub use filter::{Filter, LaggedFilter};
+#[cfg(feature = "calibrate")]
+pub use fused::{Fused, fuse};
+pub use fused::{FusedEstimate, FusedFilter, FusedSensor};
 pub use known::Known;
 pub use known_doubt::{StartDoubt, UnusedKnown, unused_known};
 #[cfg(feature = "calibrate")]
@@ -110,6 +114,8 @@ pub use ohmstrain_ekf::live::{FARTHEST_REST, Flag, Flags, KNOWN_BEYOND};
 pub use ohmstrain_ekf::{Influence, StepError};
 #[doc(no_inline)]
 pub use ohmstrain_model::ParameterError;
+#[doc(no_inline)]
+pub use ohmstrain_sensor::fusion::{FusionParams, FusionRow, RegressionParams};
 #[doc(no_inline)]
 pub use ohmstrain_sensor::{
     EstimatorKind, FieldError, Findings, JointParams, Quantity, ReadingUnit, Scores, SensorError, SensorParams,

@@ -11,6 +11,7 @@
 
 pub mod correction;
 mod error;
+pub mod fusion;
 mod params;
 mod run;
 mod sizes;

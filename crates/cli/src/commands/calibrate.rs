@@ -1,3 +1,4 @@
+use std::ops::Range;
 use std::path::Path;
 use std::time::Instant;
 
@@ -10,11 +11,13 @@ use ohmstrain_calib::{Samples, screen};
 use super::closing;
 use super::explain;
 use super::fleet;
+use super::hand;
 use super::reporting::{Reporting, Wanted};
 use super::scoring::Part;
 use super::tested::{Kept, tested};
 use crate::alignment;
 use crate::args::CalibrateArgs;
+use crate::channels::Table;
 use crate::error::CliError;
 use crate::input::{self, TraceFile, unit};
 use crate::marks::{self, MarksFile};
@@ -27,6 +30,10 @@ use ohmstrain_report::Sample;
 
 /// Calibrates a sensor on recordings, writes its parameters, and prints a summary.
 pub fn run(args: &CalibrateArgs, messages: &Messages) -> Result<(), CliError> {
+    let tables: Option<Vec<Table>> = args.traces.iter().map(|path| Table::read(path)).collect::<Result<_, _>>()?;
+    if let Some(tables) = tables {
+        return hand::calibrate::run(args, &tables, messages);
+    }
     let outcome = calibrate(args, messages)?;
     let file = args.output.display().to_string();
     let closing = outcome.closing(&file);
@@ -75,12 +82,7 @@ pub fn calibrate(args: &CalibrateArgs, messages: &Messages) -> Result<Outcome, C
     let (mut recordings, mut kept) = (Vec::new(), Vec::new());
     for path in &args.traces {
         let recording = input::read(path, &overrides)?;
-        let row_at = |time_s: f64| recording.trace.time_s.partition_point(|earlier_s| *earlier_s < time_s);
-        let end = args.until.map_or(recording.trace.len(), row_at);
-        let rows = args.from.map_or(0, row_at).min(end)..end;
-        if rows.is_empty() && !recording.trace.is_empty() {
-            return Err(recording.no_rows(args.from, args.until));
-        }
+        let rows = rows_in(args, &recording)?;
         recordings.push(recording.rows(rows.clone()));
         if rows.len() < recording.trace.len() {
             kept.push((recordings.len() - 1, Kept { whole: recording, seen: rows }));
@@ -142,8 +144,19 @@ pub fn calibrate(args: &CalibrateArgs, messages: &Messages) -> Result<Outcome, C
     Ok(outcome)
 }
 
+/// Rows of a recording between --from and --until.
+pub fn rows_in(args: &CalibrateArgs, recording: &TraceFile) -> Result<Range<usize>, CliError> {
+    let row_at = |time_s: f64| recording.trace.time_s.partition_point(|earlier_s| *earlier_s < time_s);
+    let end = args.until.map_or(recording.trace.len(), row_at);
+    let rows = args.from.map_or(0, row_at).min(end)..end;
+    if rows.is_empty() && !recording.trace.is_empty() {
+        return Err(recording.no_rows(args.from, args.until));
+    }
+    Ok(rows)
+}
+
 /// Returns the calibration with the choices that the flags have made.
-fn calibration(args: &CalibrateArgs) -> Calibration<'static> {
+pub fn calibration(args: &CalibrateArgs) -> Calibration<'static> {
     let mut calibration = Calibration::new();
     if let Some(estimator) = args.estimator.chosen() {
         calibration = calibration.estimator(estimator.0);
@@ -180,7 +193,7 @@ pub fn calibrate_recordings(
 }
 
 /// Samples of recordings, with what is known of each.
-fn known_recordings<'a>(
+pub fn known_recordings<'a>(
     recordings: &'a [TraceFile],
     samples: &[Samples<'a>],
     (quantity, reading): (Quantity, ReadingUnit),
@@ -208,7 +221,7 @@ fn file_name(path: &str) -> &str {
 }
 
 /// Quantity and unit that all recordings share.
-fn common_units(recordings: &[TraceFile]) -> Result<(Quantity, ReadingUnit), CliError> {
+pub fn common_units(recordings: &[TraceFile]) -> Result<(Quantity, ReadingUnit), CliError> {
     let first = &recordings[0];
     let (quantity, reading) = (first.quantity().unwrap_or(Quantity::Strain), unit(first.trace.readings.kind));
     for recording in recordings {

@@ -14,6 +14,10 @@ pub enum Kind {
     Import,
     /// A sensor's parameters.
     Sensor,
+    /// The description of a hand.
+    Hand,
+    /// Fusion of the channels of one joint.
+    Fusion,
     /// Prior of a fleet.
     Prior,
     /// State of a running filter.
@@ -39,6 +43,8 @@ impl Kind {
             Self::Simulation => "a simulated recording",
             Self::Import => "an imported recording",
             Self::Sensor => "a sensor file",
+            Self::Hand => "the description of a hand",
+            Self::Fusion => "a fusion",
             Self::Prior => "a prior",
             Self::State => "the state of a filter",
             Self::Estimates => "estimates",
@@ -62,8 +68,11 @@ impl Kind {
             Self::Import => is_made_by(head, IMPORT) || is_made_by(head, SIMULATE),
             Self::Sensor => {
                 let (is_own, third) = (is_format(line()) && is_made_by_toml(line()), line());
-                is_own && !third.starts_with("sensors = ") && !third.starts_with("sensor = ")
+                let others = ["sensors = ", "sensor = ", FUSION];
+                is_own && !third.is_empty() && !others.iter().any(|other| third.starts_with(other))
             }
+            Self::Hand => is_format(line()) && is_made_by_toml(line()) && line().is_empty() && line() == "[[joints]]",
+            Self::Fusion => is_format(line()) && is_made_by_toml(line()) && line().starts_with(FUSION),
             Self::Prior => is_format(line()) && is_made_by_toml(line()) && line().starts_with("sensors = "),
             Self::State => is_format(line()) && is_made_by_toml(line()) && line().starts_with("sensor = "),
             Self::Estimates | Self::Summary => self.has_columns(&names_in(line()), own),
@@ -86,6 +95,9 @@ impl Kind {
     }
 }
 
+/// Third line of a fusion.
+const FUSION: &str = "sd_scale = ";
+
 fn names_in(header: &str) -> Vec<String> {
     header.split(',').map(str::to_owned).collect()
 }
@@ -95,13 +107,15 @@ fn is_recorded(name: &str) -> bool {
     ["time_s", "resistance_ohm", "resistance_ratio", "strain", "angle_deg"].contains(&name)
 }
 
-/// True if a header is that of `hand`: an angle and its deviation for each joint.
+/// True if a header is that of `hand`: an angle, or a strain, and its deviation for each joint.
 pub fn is_of_a_hand(header: &str) -> bool {
     let joints = header.strip_prefix("time_s,").and_then(|rest| rest.strip_suffix(",flags"));
     joints.is_some_and(|joints| {
         let names: Vec<&str> = joints.split(',').collect();
         let is_joint = |pair: &[&str]| match pair {
-            [angle, sd] => angle.strip_suffix("_deg").is_some_and(|joint| sd.strip_suffix("_sd_deg") == Some(joint)),
+            [value, sd] => [("_deg", "_sd_deg"), ("_strain", "_strain_sd")].iter().any(|(ending, of_sd)| {
+                value.strip_suffix(ending).is_some_and(|joint| sd.strip_suffix(of_sd) == Some(joint))
+            }),
             _ => false,
         };
         names.chunks(2).all(is_joint)

@@ -15,6 +15,7 @@ use sensors::{Rivals, Sensor, phases};
 use told::Told;
 
 use crate::args::{EvaluateArgs, Split};
+use crate::commands::hand;
 use crate::commands::reporting::{Drawn, Reporting, Wanted, sample};
 use crate::commands::scoring::Part;
 use crate::error::CliError;
@@ -23,6 +24,7 @@ use crate::messages::Messages;
 use crate::output::{Outputs, print};
 use crate::progress::Progress;
 use crate::run::rest_resistance;
+use crate::sensor_file;
 use crate::suits;
 use ohmstrain_report::Sample;
 
@@ -31,6 +33,9 @@ const LEAST_COVERAGE: f64 = 0.8;
 
 /// Compares estimates with the reference of each recording.
 pub fn run(args: &EvaluateArgs, messages: &Messages) -> Result<(), CliError> {
+    if let Some(hand) = args.calibration.sensor.as_ref().filter(|path| sensor_file::is_of_a_hand(path)) {
+        return hand::evaluate::run(args, hand);
+    }
     evaluate(args, messages, &mut Evaluation::default(), |evaluation| print(|out| evaluation.write(out, args.json)))
 }
 

@@ -2,42 +2,95 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use ohmstrain_bench_data::{FrontEndSpec, JointSpec};
-use serde::{Deserialize, Deserializer};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::error::CliError;
 use crate::sensor_file;
 use crate::whole_file;
 
 /// The version of the file that is read.
-const FORMAT: u32 = 1;
+pub const FORMAT: u32 = 1;
 
 /// `hand.toml`.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug)]
 pub struct Description {
-    format: u32,
     /// The joints, in the order of the output.
     pub joints: Vec<Joint>,
 }
 
-/// A joint and its sensor.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+/// A joint and its sensors.
+#[derive(Debug)]
 pub struct Joint {
     /// Name of its columns in the output.
     pub name: String,
-    /// Name of its readings' column in the recording.
+    /// Columns of its readings in the recording, each with its sensor; at least one.
+    pub channels: Vec<Channel>,
+    /// The file of how they are fused, from the description's folder; `None` for a joint with one channel.
+    pub fusion: Option<PathBuf>,
+    /// The joint that the sensors span, unless they know.
+    pub joint: Option<JointSpec>,
+}
+
+/// A column of readings and its sensor.
+#[derive(Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Channel {
+    /// Name of the column.
     pub column: String,
     /// The sensor's file, from the description's folder.
     pub sensor: PathBuf,
-    /// The joint that the sensor spans, unless the sensor knows.
-    #[serde(default, deserialize_with = "spec")]
-    pub joint: Option<JointSpec>,
     /// Reading of the rested sensor today.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub rest_resistance: Option<f64>,
     /// Electronics, if the column has converter codes.
-    #[serde(default, deserialize_with = "spec")]
+    #[serde(default, deserialize_with = "spec", skip_serializing)]
     pub front_end: Option<FrontEndSpec>,
+}
+
+/// The file as it is written.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    format: u32,
+    /// Program that made it; a description written by hand names none.
+    #[serde(rename = "made_by")]
+    _made_by: Option<String>,
+    joints: Vec<Entry>,
+}
+
+/// A joint as it is written: one channel in its own table, or several in tables of theirs.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Entry {
+    name: String,
+    column: Option<String>,
+    sensor: Option<PathBuf>,
+    rest_resistance: Option<f64>,
+    #[serde(default, deserialize_with = "spec")]
+    front_end: Option<FrontEndSpec>,
+    #[serde(default)]
+    channels: Vec<Channel>,
+    fusion: Option<PathBuf>,
+    #[serde(default, deserialize_with = "spec")]
+    joint: Option<JointSpec>,
+}
+
+impl Entry {
+    /// The joint, or what is missing of it.
+    fn joint(self) -> Result<Joint, &'static str> {
+        let Self { name, column, sensor, rest_resistance, front_end, channels, fusion, joint } = self;
+        let channels = match (column, sensor) {
+            (Some(column), Some(sensor)) if channels.is_empty() && fusion.is_none() => {
+                vec![Channel { column, sensor, rest_resistance, front_end }]
+            }
+            (None, None) if channels.len() > 1 && rest_resistance.is_none() && front_end.is_none() => channels,
+            _ => return Err("expected `column` and `sensor`, or two or more `[[joints.channels]]` that have them"),
+        };
+        if channels.len() > 1 && fusion.is_none() {
+            return Err("expected `fusion`, the file that `ohmstrain calibrate` wrote for these channels");
+        }
+        Ok(Joint { name, channels, fusion, joint })
+    }
 }
 
 fn spec<'de, D: Deserializer<'de>, T: FromStr<Err: std::fmt::Display>>(source: D) -> Result<Option<T>, D::Error> {
@@ -66,7 +119,7 @@ impl Description {
             let line = error.span().map_or(1, |span| 1 + text[..span.start].matches('\n').count());
             CliError::Input(format!("{name}:{line}: {}", error.message().replace('\n', " ")))
         };
-        let found: Self = toml::from_str(&text).map_err(wrong)?;
+        let found: File = toml::from_str(&text).map_err(wrong)?;
         if found.format != FORMAT {
             return Err(CliError::Input(format!("{name}: expected `format = {FORMAT}`, found {}", found.format)));
         }
@@ -82,13 +135,10 @@ impl Description {
         if found.joints.is_empty() {
             return Err(CliError::Input(format!("{name}: expected at least one `[[joints]]`, found none")));
         }
-        Ok(found)
-    }
-
-    /// Columns of the output.
-    pub fn columns(&self) -> Vec<String> {
-        let of_joint = |joint: &Joint| [format!("{}_deg", joint.name), format!("{}_sd_deg", joint.name)];
-        let angles = self.joints.iter().flat_map(of_joint);
-        std::iter::once("time_s".to_owned()).chain(angles).chain(["flags".to_owned()]).collect()
+        let joint = |entry: Entry| {
+            let joint = entry.name.clone();
+            entry.joint().map_err(|what| CliError::Input(format!("{name}: joint `{joint}`: {what}")))
+        };
+        Ok(Self { joints: found.joints.into_iter().map(joint).collect::<Result<_, _>>()? })
     }
 }

@@ -1,0 +1,200 @@
+//! Fusion of several channels that see one strain, learned from what each of them and regressions on all their readings say of blocks
+//! left out.
+
+mod neighbours;
+mod readings;
+mod regressions;
+
+use std::collections::HashMap;
+
+use ohmstrain_sensor::fusion::{FUSION_FORMAT, FusionParams, Voice};
+use ohmstrain_sensor::{Quantity, RangeParams, Scores};
+
+use crate::CalibrationError;
+use crate::calibrate::findings::LeftOutRow;
+use crate::calibrate::scores::{ScoredRow, score_of_full_scale};
+use crate::motion_stats::MotionStats;
+use crate::samples::Samples;
+use crate::sd_scale::sd_scale;
+use neighbours::Neighbours;
+use readings::{Readings, Row};
+
+/// Blocks of each recording, left out one after another.
+const BLOCKS: usize = 4;
+/// Rows of the calibration that a fusion keeps.
+const KEPT_ROWS: usize = 320;
+/// Low-passes, in multiples of the time in which the strain changes by twice its standard deviation, and those that each regression sees.
+const LOW_PASSES: [f64; 3] = [1.0 / 3.0, 1.0, 3.0];
+const REGRESSIONS: [&[usize]; 3] = [&[0], &[1], &[0, 2]];
+/// Shrinkage of the errors' correlations: blocks are few, errors of one block are alike.
+const SHRINKAGE: f64 = 0.5;
+
+/// A channel with what its calibration found.
+#[derive(Clone, Copy, Debug)]
+pub struct FusionChannel<'a> {
+    /// Its recordings, row for row at the times of the other channels'.
+    pub recordings: &'a [Samples<'a>],
+    /// R₀ of the calibrated sensor.
+    pub rest_reading: f64,
+    /// Its filter's estimates of parts left out.
+    pub left_out: &'a [LeftOutRow],
+}
+
+/// A fusion with its quality on parts left out.
+#[derive(Clone, Debug)]
+pub struct FusionFit {
+    /// The fusion.
+    pub params: FusionParams,
+    /// Scores of the fused estimate; `None` if the channels have no estimates of parts left out.
+    pub fused: Option<Scores>,
+    /// Scores of each channel alone on the same rows.
+    pub channels: Vec<Option<Scores>>,
+}
+
+/// Learns to fuse channels.
+///
+/// # Errors
+/// If there are less than two channels, if their recordings have other times, or if no row has readings of all channels and a strain.
+pub fn fit_fusion(
+    channels: &[FusionChannel],
+    quantity: Quantity,
+    made_by: &str,
+) -> Result<FusionFit, CalibrationError> {
+    let recordings = channels.first().map_or(&[][..], |channel| channel.recordings);
+    let limits = limits(recordings)?;
+    let low_pass_s = low_passes(recordings);
+    let readings = Readings::new(channels, &low_pass_s)?;
+    let neighbours = Neighbours::new(&readings);
+    let (regressions, left_out) = regressions::fit(&readings, limits.span())?;
+    let params = FusionParams {
+        format: FUSION_FORMAT,
+        made_by: made_by.into(),
+        sd_scale: 1.0,
+        quantity,
+        limits,
+        novelty: neighbours.novelty,
+        channel_sd: neighbours.channel_sd.clone(),
+        error_covariance: identity(channels.len() + regressions.len()),
+        low_pass_s,
+        regressions,
+        rows: readings.thinned(|_| true, KEPT_ROWS).map(|row| row.seen.clone()).collect(),
+    };
+    let judged = judged(channels, &readings, &left_out);
+    if judged.is_empty() {
+        return Ok(FusionFit { params, fused: None, channels: vec![None; channels.len()] });
+    }
+    let covariance = covariance(&judged);
+    let with = |voices: usize| {
+        let params = FusionParams {
+            error_covariance: covariance[..voices].iter().map(|of_voice| of_voice[..voices].to_vec()).collect(),
+            regressions: params.regressions[..voices - channels.len()].to_vec(),
+            ..params.clone()
+        };
+        scaled(params, &judged, &neighbours)
+    };
+    let (all, channels_only) = (with(covariance.len()), with(channels.len()));
+    let params = if log_loss(&all, &judged, &neighbours) <= log_loss(&channels_only, &judged, &neighbours) {
+        all
+    } else {
+        channels_only
+    };
+    let fused = score(&judged, &fused(&params, &judged, &neighbours));
+    let of_channel = |channel| score(&judged, &judged.iter().map(|one| Some(one.voices[channel])).collect::<Vec<_>>());
+    Ok(FusionFit { fused, channels: (0..channels.len()).map(of_channel).collect(), params })
+}
+
+/// Fused estimates of judged rows.
+fn fused(params: &FusionParams, judged: &[Judged], neighbours: &Neighbours) -> Vec<Option<Voice>> {
+    let voices = params.error_covariance.len();
+    judged.iter().map(|one| params.fused(&one.voices[..voices], neighbours.excess(one.row.place))).collect()
+}
+
+/// The parameters with the factor that makes the fused interval cover the worst block.
+fn scaled(params: FusionParams, judged: &[Judged], neighbours: &Neighbours) -> FusionParams {
+    let mut blocks = vec![Vec::new(); BLOCKS];
+    for (one, voice) in judged.iter().zip(fused(&params, judged, neighbours)) {
+        blocks[one.row.block].extend(voice.map(|voice| (voice.strain - one.row.seen.strain).abs() / voice.sd));
+    }
+    FusionParams { sd_scale: sd_scale(&blocks), ..params }
+}
+
+/// Mean negative log density of the strain under the fused estimate.
+fn log_loss(params: &FusionParams, judged: &[Judged], neighbours: &Neighbours) -> f64 {
+    let fused = fused(params, judged, neighbours);
+    let losses = judged.iter().zip(&fused).map(|(one, voice)| {
+        let loss = |voice: &Voice| 0.5 * ((voice.strain - one.row.seen.strain) / voice.sd).powi(2) + voice.sd.ln();
+        voice.as_ref().map_or(f64::INFINITY, loss)
+    });
+    losses.sum::<f64>() / judged.len() as f64
+}
+
+/// The range of the strain.
+fn limits(recordings: &[Samples]) -> Result<RangeParams, CalibrationError> {
+    let strains = || recordings.iter().flat_map(|samples| samples.strain).copied().filter(|strain| strain.is_finite());
+    let (lower, upper) = (strains().fold(f64::INFINITY, f64::min), strains().fold(f64::NEG_INFINITY, f64::max));
+    if lower < upper { Ok(RangeParams { lower, upper }) } else { Err(CalibrationError::NoCommonRows) }
+}
+
+/// Time constants for the motion of these recordings, s.
+fn low_passes(recordings: &[Samples]) -> Vec<f64> {
+    let stats = MotionStats::new(recordings);
+    let time_s = 2.0 * stats.strain_sd / stats.rate_sd.max(1e-12);
+    LOW_PASSES.iter().map(|share| share * time_s).collect()
+}
+
+/// A row that every voice has estimated without having seen its block.
+struct Judged<'a> {
+    row: &'a Row,
+    voices: Vec<Voice>,
+}
+
+/// Rows that all channels have estimated, with the regressions' estimates.
+fn judged<'a>(channels: &[FusionChannel], readings: &'a Readings, regressions: &[Vec<Voice>]) -> Vec<Judged<'a>> {
+    let by_row = |channel: &FusionChannel| -> HashMap<(usize, usize), Voice> {
+        let of_row = |one: &LeftOutRow| ((one.recording, one.row), Voice { strain: one.strain, sd: one.strain_sd });
+        channel.left_out.iter().map(of_row).collect()
+    };
+    let own: Vec<HashMap<(usize, usize), Voice>> = channels.iter().map(by_row).collect();
+    let of_row = |row: &'a Row| {
+        let of_channel = |own: &HashMap<(usize, usize), Voice>| own.get(&(row.recording, row.row)).copied();
+        let mut voices: Vec<Voice> = own.iter().map(of_channel).collect::<Option<_>>()?;
+        voices.extend(regressions.iter().map(|regression| regression[row.place]));
+        Some(Judged { row, voices })
+    };
+    readings.rows.iter().filter_map(of_row).collect()
+}
+
+/// Covariances about zero of the voices' errors in units of their deviations. Correlations are shrunken toward none, and a voice that errs
+/// less than it says is not believed more for it.
+fn covariance(judged: &[Judged]) -> Vec<Vec<f64>> {
+    let voices = judged.first().map_or(0, |one| one.voices.len());
+    let mut sums = vec![vec![0.0; voices]; voices];
+    for one in judged {
+        let deviations: Vec<f64> =
+            one.voices.iter().map(|voice| (voice.strain - one.row.seen.strain) / voice.sd).collect();
+        for (i, of_voice) in sums.iter_mut().enumerate() {
+            of_voice.iter_mut().zip(&deviations).for_each(|(sum, other)| *sum += deviations[i] * other);
+        }
+    }
+    let size = |voice: usize| (sums[voice][voice] / judged.len() as f64).sqrt().max(1.0);
+    let shrunken = |i: usize, j: usize| {
+        let correlation = sums[i][j] / (sums[i][i] * sums[j][j]).sqrt().max(f64::MIN_POSITIVE);
+        size(i) * size(j) * if i == j { 1.0 } else { (1.0 - SHRINKAGE) * correlation }
+    };
+    (0..voices).map(|i| (0..voices).map(|j| shrunken(i, j)).collect()).collect()
+}
+
+fn identity(voices: usize) -> Vec<Vec<f64>> {
+    (0..voices).map(|i| (0..voices).map(|j| f64::from(u8::from(i == j))).collect()).collect()
+}
+
+/// Scores of estimates of these rows.
+fn score(judged: &[Judged], voices: &[Option<Voice>]) -> Option<Scores> {
+    let row = |(one, voice): (&Judged, &Option<Voice>)| {
+        let voice = (*voice)?;
+        let (time_s, truth) = (one.row.time_s, one.row.seen.strain);
+        Some(ScoredRow { time_s, truth, strain: voice.strain, sd: Some(voice.sd) })
+    };
+    let rows: Vec<ScoredRow> = judged.iter().zip(voices).filter_map(row).collect();
+    score_of_full_scale(&rows)
+}

@@ -1,0 +1,220 @@
+//! Calibration of all channels of a recording: a sensor file for each, and a description of the joints that they belong to.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use ohmstrain::{Calibrated, Fused, MADE_BY, Recording, fuse};
+use ohmstrain_calib::Samples;
+use serde::Serialize;
+
+use super::description::{Channel as Entry, FORMAT};
+use super::scores::{self, ChannelScores, JointScores};
+use crate::args::CalibrateArgs;
+use crate::channels::{Channel, Table, reference};
+use crate::commands::calibrate::{calibrate_recordings, calibration, common_units, known_recordings, rows_in};
+use crate::error::CliError;
+use crate::input::TraceFile;
+use crate::messages::Messages;
+use crate::output::{Claim, Kind, Outputs, print};
+use crate::progress::Progress;
+use crate::sensor_file;
+
+/// `hand.toml` as it is written.
+#[derive(Serialize)]
+struct Written {
+    format: u32,
+    made_by: &'static str,
+    joints: Vec<WrittenJoint>,
+}
+
+/// A joint of it: of one channel, or of several.
+#[derive(Serialize)]
+struct WrittenJoint {
+    name: String,
+    #[serde(flatten)]
+    only: Option<Entry>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    fusion: Option<PathBuf>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    channels: Vec<Entry>,
+}
+
+/// Channels of one joint.
+struct Group {
+    name: String,
+    channels: Vec<Channel>,
+}
+
+/// Calibrates every channel, fuses those of one joint, and writes the description of all.
+pub fn run(args: &CalibrateArgs, tables: &[Table], messages: &Messages) -> Result<(), CliError> {
+    refuse_flags(args)?;
+    let stem = args.output.file_stem().map_or_else(|| "hand".into(), |stem| stem.to_string_lossy().into_owned());
+    let groups = groups(tables, &stem)?;
+    let mut outputs = Outputs::new(args.replace.force, &args.traces);
+    let hand = outputs.claim(&args.output, Kind::Hand)?;
+    let mut claimed = Vec::new();
+    for group in &groups {
+        claimed.push(Files::claim(group, &args.output, &stem, &mut outputs)?);
+    }
+    let (mut written, mut scored) = (Vec::new(), Vec::new());
+    for (group, files) in groups.iter().zip(claimed) {
+        let (joint, scores) = group.calibrate(args, tables, files, &mut outputs, messages)?;
+        written.push(joint);
+        scored.push(scores);
+    }
+    let text = toml::to_string(&Written { format: FORMAT, made_by: MADE_BY, joints: written });
+    outputs.put(hand, text.map_err(|error| CliError::Other(format!("cannot write the description: {error}")))?);
+    outputs.publish()?;
+    if messages.is_quiet() && !args.json {
+        return Ok(());
+    }
+    let file = args.output.display();
+    let heading = format!("{file}: each quarter of the recordings estimated with what the other quarters say");
+    print(|out| scores::write(out, &heading, &scored, args.json))
+}
+
+/// Refuses what is for one channel.
+fn refuse_flags(args: &CalibrateArgs) -> Result<(), CliError> {
+    let flags = [
+        ("--report", args.report.report.is_some()),
+        ("--figures", args.report.figures.is_some()),
+        ("--explain", args.explain),
+        ("--bootstrap", args.bootstrap.is_some()),
+        ("--marks", !args.marks.is_empty()),
+        ("--align", args.align),
+        ("--prior", args.prior.is_some()),
+    ];
+    match flags.iter().find(|(_, is_set)| *is_set) {
+        Some((flag, _)) => Err(CliError::Arguments(format!(
+            "{flag} is for recordings of one channel, and these have a column of readings for each of several"
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// Channels by the reference that they share. A reference with a name of its own names the joint, one for all is named by the output.
+fn groups(tables: &[Table], stem: &str) -> Result<Vec<Group>, CliError> {
+    let (mut places, mut groups): (BTreeMap<String, usize>, Vec<Group>) = (BTreeMap::new(), Vec::new());
+    let first = tables.first().map_or_else(|| Ok(Vec::new()), Table::channels)?;
+    for table in tables {
+        let found = table.channels()?;
+        if found != first {
+            let names =
+                |channels: &[Channel]| channels.iter().map(|one| one.column.as_str()).collect::<Vec<_>>().join(", ");
+            return Err(CliError::Input(format!(
+                "{}: expected the channels of the first recording, {}, found {}",
+                table.header_name(),
+                names(&first),
+                names(&found)
+            )));
+        }
+    }
+    for channel in first {
+        let own = reference(&channel.reference).map_or("", |(own, _)| own);
+        let place = *places.entry(channel.reference.clone()).or_insert(groups.len());
+        if place == groups.len() {
+            let name = plain(if own.is_empty() { stem } else { own });
+            groups.push(Group { name, channels: Vec::new() });
+        }
+        groups[place].channels.push(channel);
+    }
+    Ok(groups)
+}
+
+/// A name of the characters that joints' names may have.
+fn plain(name: &str) -> String {
+    name.chars().map(|c| if c.is_ascii_alphanumeric() || "_-.".contains(c) { c } else { '_' }).collect()
+}
+
+/// Files of a joint.
+struct Files {
+    sensors: Vec<(PathBuf, Claim)>,
+    fusion: Option<(PathBuf, Claim)>,
+}
+
+impl Files {
+    /// Claims them beside the description: hand-index.toml for channel index, hand-fusion.toml.
+    fn claim(group: &Group, hand: &Path, stem: &str, outputs: &mut Outputs) -> Result<Self, CliError> {
+        let folder = hand.parent().unwrap_or(Path::new(""));
+        let mut claim = |name: String, kind: Kind| -> Result<(PathBuf, Claim), CliError> {
+            let claim = outputs.claim(&folder.join(&name), kind)?;
+            Ok((name.into(), claim))
+        };
+        let sensor = |channel: &Channel| format!("{stem}-{}.toml", plain(&channel.name));
+        let sensors = group.channels.iter().map(|one| claim(sensor(one), Kind::Sensor)).collect::<Result<_, _>>()?;
+        let of_joint = if group.name == plain(stem) { String::new() } else { format!("-{}", group.name) };
+        let fusion = group.channels.len() > 1;
+        let fusion = fusion.then(|| claim(format!("{stem}{of_joint}-fusion.toml"), Kind::Fusion)).transpose()?;
+        Ok(Self { sensors, fusion })
+    }
+}
+
+impl Group {
+    fn calibrate(
+        &self,
+        args: &CalibrateArgs,
+        tables: &[Table],
+        files: Files,
+        outputs: &mut Outputs,
+        messages: &Messages,
+    ) -> Result<(WrittenJoint, JointScores), CliError> {
+        let (mut recordings, mut calibrated) = (Vec::new(), Vec::new());
+        for channel in &self.channels {
+            let traces = self.traces(args, tables, channel)?;
+            let progress = Progress::new("calibrating", messages);
+            messages.detail(&format!("channel `{}`", channel.column));
+            calibrated.push(
+                calibrate_recordings(&traces, calibration(args), &progress).map_err(|error| named(error, channel))?,
+            );
+            recordings.push(traces);
+        }
+        let mut entries = Vec::new();
+        for ((channel, (path, claim)), calibrated) in self.channels.iter().zip(files.sensors).zip(&calibrated) {
+            outputs.put(claim, sensor_file::text(&calibrated.sensor)?);
+            let column = channel.column.clone();
+            entries.push(Entry { column, sensor: path, rest_resistance: None, front_end: None });
+        }
+        let name = self.name.clone();
+        let Some((path, claim)) = files.fusion else {
+            let alone = calibrated.first().and_then(|one| one.findings.as_ref()).map(|findings| findings.filter);
+            let scores = JointScores { joint: name.clone(), fused: alone, channels: Vec::new() };
+            return Ok((WrittenJoint { name, only: entries.pop(), fusion: None, channels: Vec::new() }, scores));
+        };
+        let fused = fused(&recordings, &calibrated)?;
+        outputs.put(claim, fused.sensor.to_toml()?);
+        let columns = self.channels.iter().map(|channel| channel.column.clone());
+        let channels = columns.zip(fused.channels).map(|(column, alone)| ChannelScores { column, alone }).collect();
+        let scores = JointScores { joint: name.clone(), fused: fused.scores, channels };
+        Ok((WrittenJoint { name, only: None, fusion: Some(path), channels: entries }, scores))
+    }
+
+    /// The recordings of a channel, as far as they are calibrated on.
+    fn traces(&self, args: &CalibrateArgs, tables: &[Table], channel: &Channel) -> Result<Vec<TraceFile>, CliError> {
+        let overrides = args.units.metadata();
+        let rows = |table: &Table| {
+            let trace = table.trace(channel, &overrides)?;
+            Ok(trace.rows(rows_in(args, &trace)?))
+        };
+        tables.iter().map(rows).collect()
+    }
+}
+
+/// An error with the channel that it is about.
+fn named(error: CliError, channel: &Channel) -> CliError {
+    match error {
+        CliError::Input(text) => CliError::Input(format!("channel `{}`: {text}", channel.column)),
+        other => other,
+    }
+}
+
+/// Fuses the channels of a joint, recordings channel by channel.
+fn fused(recordings: &[Vec<TraceFile>], calibrated: &[Calibrated]) -> Result<Fused, CliError> {
+    let mut known: Vec<Vec<Recording>> = Vec::new();
+    for traces in recordings {
+        let samples: Vec<Samples> = traces.iter().map(TraceFile::samples).collect::<Result<_, _>>()?;
+        known.push(known_recordings(traces, &samples, common_units(traces)?)?);
+    }
+    let pairs: Vec<(&Calibrated, &[Recording])> =
+        calibrated.iter().zip(&known).map(|(calibrated, known)| (calibrated, known.as_slice())).collect();
+    Ok(fuse(&pairs)?)
+}

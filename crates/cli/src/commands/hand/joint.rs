@@ -1,0 +1,230 @@
+use std::path::Path;
+
+use ohmstrain::{Error, Estimate, Filter, FusedFilter, FusedSensor, Quantity, Reading, ReadingUnit, Sensor, UnitGuess};
+use ohmstrain_bench_data::{LineParser, Metadata};
+
+use super::description::{Channel as Entry, Joint as Description};
+use crate::error::CliError;
+use crate::input::{self, reading_column};
+use crate::sensor_file;
+use crate::suits::FIRST_LIVE_READINGS;
+use crate::whole_file;
+
+/// A joint with its channels and the filter of them.
+pub struct Joint<'a> {
+    pub name: &'a str,
+    pub channels: Vec<Channel<'a>>,
+    /// Fusion of the channels; `None` for a joint with one.
+    fusion: Option<FusedSensor>,
+    filter: JointFilter,
+}
+
+enum JointFilter {
+    One(Box<Filter>),
+    Fused(Box<FusedFilter>),
+}
+
+/// A column of readings with its sensor.
+pub struct Channel<'a> {
+    /// Name of its joint.
+    pub joint: &'a str,
+    pub entry: &'a Entry,
+    pub sensor: Sensor,
+    pub lines: LineParser,
+    /// The first known readings.
+    early: Vec<f64>,
+}
+
+/// Estimate of a joint in one row.
+pub struct JointRow {
+    /// Angle in degrees, or strain: the number that is reported.
+    pub value: f64,
+    /// Its standard deviation.
+    pub sd: f64,
+    /// Estimate of the quantity that its sensors were calibrated on.
+    pub strain: f64,
+    /// Its standard deviation.
+    pub strain_sd: f64,
+    /// Flags, each behind the name of the joint or the column.
+    pub flags: Vec<String>,
+    /// Estimates of the channels by themselves.
+    pub channels: Vec<Estimate>,
+}
+
+impl<'a> Joint<'a> {
+    /// Reads the sensors of a joint from the folder of the description, for a recording with this name.
+    pub fn new(joint: &'a Description, folder: &Path, file: &str) -> Result<Self, CliError> {
+        let channel = |entry: &'a Entry| Channel::new(joint, entry, folder, file);
+        let channels: Vec<Channel<'a>> = joint.channels.iter().map(channel).collect::<Result<_, _>>()?;
+        let sensors = || channels.iter().map(|channel| channel.sensor.clone()).collect();
+        let fusion = joint.fusion.as_ref().map(|path| {
+            let path = folder.join(path);
+            let text = whole_file::text(&path)?;
+            let name = path.display().to_string();
+            FusedSensor::from_toml(sensors(), &text).map_err(|error| CliError::Input(error.in_file(&name)))
+        });
+        let fusion = fusion.transpose()?;
+        let filter = filter(&channels, fusion.as_ref())?;
+        Ok(Self { name: &joint.name, channels, fusion, filter })
+    }
+
+    /// Endings of its columns in the output.
+    pub fn endings(&self) -> [&'static str; 2] {
+        let is_strain = |channel: &Channel| {
+            channel.sensor.params().quantity == Quantity::Strain && channel.sensor.params().joint.is_none()
+        };
+        if self.channels.iter().all(is_strain) { ["_strain", "_strain_sd"] } else { ["_deg", "_sd_deg"] }
+    }
+
+    /// The quantity that its sensors were calibrated on.
+    pub fn quantity(&self) -> Quantity {
+        self.channels.first().map_or(Quantity::Strain, |channel| channel.sensor.params().quantity)
+    }
+
+    /// The clock has started again, and so does the filter.
+    pub fn restart(&mut self) -> Result<(), CliError> {
+        self.filter = filter(&self.channels, self.fusion.as_ref())?;
+        self.channels.iter_mut().for_each(|channel| channel.early.clear());
+        Ok(())
+    }
+
+    /// Takes the channels' readings.
+    pub fn step(&mut self, time_s: f64, readings: &[Reading]) -> Result<JointRow, Error> {
+        match &mut self.filter {
+            JointFilter::One(filter) => {
+                let estimate = filter.step(time_s, readings.first().copied().unwrap_or(Reading::MISSING))?;
+                let flags = estimate.flags.names().map(|flag| format!("{}:{flag}", self.name)).collect();
+                let (value, sd) = angle(&estimate);
+                let (strain, strain_sd) = (estimate.strain, estimate.strain_sd);
+                Ok(JointRow { value, sd, strain, strain_sd, flags, channels: vec![estimate] })
+            }
+            JointFilter::Fused(filter) => {
+                let estimate = filter.step(time_s, readings)?;
+                let of_channels = self.channels.iter().zip(&estimate.channels).flat_map(|(channel, row)| {
+                    row.flags.names().map(|flag| format!("{}:{flag}", channel.entry.column))
+                });
+                let faulty = estimate.faulty.map(|channel| format!("{}:faulty", self.channels[channel].entry.column));
+                let unlike = estimate.is_unlike.then(|| format!("{}:unlike_calibration", self.name));
+                let flags = unlike.into_iter().chain(faulty).chain(of_channels).collect();
+                let value = estimate.angle_deg.unwrap_or(estimate.strain);
+                let sd = estimate.angle_sd.unwrap_or(estimate.strain_sd);
+                let (strain, strain_sd) = (estimate.strain, estimate.strain_sd);
+                Ok(JointRow { value, sd, strain, strain_sd, flags, channels: estimate.channels })
+            }
+        }
+    }
+}
+
+/// A filter of the channels that has seen nothing.
+fn filter(channels: &[Channel], fusion: Option<&FusedSensor>) -> Result<JointFilter, CliError> {
+    let mut filters = channels.iter().map(Channel::filter).collect::<Result<Vec<_>, _>>()?;
+    match (fusion, filters.pop()) {
+        (None, Some(only)) => Ok(JointFilter::One(Box::new(only))),
+        (Some(fusion), Some(last)) => {
+            filters.push(last);
+            Ok(JointFilter::Fused(Box::new(fusion.filter_of(filters)?)))
+        }
+        (_, None) => Err(CliError::Input("expected a joint with a channel, found none".into())),
+    }
+}
+
+/// Angle and standard deviation, degrees: by the joint, or what the sensor was calibrated on.
+fn angle(estimate: &Estimate) -> (f64, f64) {
+    match (estimate.angle_deg, estimate.angle_sd) {
+        (Some(angle), Some(sd)) => (angle, sd),
+        _ => (estimate.strain, estimate.strain_sd),
+    }
+}
+
+impl<'a> Channel<'a> {
+    fn new(joint: &'a Description, entry: &'a Entry, folder: &Path, file: &str) -> Result<Self, CliError> {
+        let mut sensor = sensor_file::read(&folder.join(&entry.sensor), None)?;
+        if let Some(spec) = joint.joint {
+            let metadata = Metadata { joint: Some(spec), ..Metadata::default() };
+            if let Some(joint) = input::joint(&metadata) {
+                sensor = sensor.on_joint(joint)?;
+            }
+        }
+        if let Some(measured) = entry.rest_resistance {
+            let refused = |error| CliError::Input(format!("joint `{}`: rest_resistance: {error}", joint.name));
+            sensor.check_rest_resistance(measured).map_err(refused)?;
+        }
+        let lines = LineParser::new(file, Metadata { front_end: entry.front_end, ..Metadata::default() });
+        Ok(Self { joint: &joint.name, entry, sensor, lines, early: vec![] })
+    }
+
+    fn filter(&self) -> Result<Filter, Error> {
+        let wanted = self.sensor.filter();
+        self.entry.rest_resistance.map_or(wanted, |measured| wanted.rest_resistance(measured)).build()
+    }
+
+    /// The header as this channel sees it: its column is the reading, those of others are passed over.
+    pub fn header(&self, header: &str) -> Result<String, String> {
+        let has = |column: &str| header.split(',').any(|name| name.trim() == column);
+        if !has("time_s") && !has("time_us") {
+            return Err(format!("expected a header with the column `time_s` or `time_us`, found {}", quoted(header)));
+        }
+        let (joint, column) = (self.joint, &self.entry.column);
+        if !has(column) {
+            return Err(format!("joint `{joint}`: expected a column `{column}`, found {}", quoted(header)));
+        }
+        let expected = self.sensor.params().reading;
+        if let Some(found) = self.said_unit().filter(|found| *found != expected) {
+            return Err(format!(
+                "column `{column}`: joint `{joint}`: expected `{}` as in the sensor's calibration, found `{}`",
+                reading_column(expected),
+                reading_column(found)
+            ));
+        }
+        let own = if self.entry.front_end.is_some() { "adc" } else { reading_column(expected) };
+        let cell = |name: &str| match name.trim() {
+            name if name == column => own.to_owned(),
+            name @ ("time_s" | "time_us") => name.to_owned(),
+            _ => "_".to_owned(),
+        };
+        Ok(header.split(',').map(cell).collect::<Vec<_>>().join(","))
+    }
+
+    /// Returns the unit of the readings by the electronics, the lines above the header or the end of the column's name.
+    fn said_unit(&self) -> Option<ReadingUnit> {
+        if self.entry.front_end.is_some() || self.lines.metadata().resistance_unit.is_some() {
+            return Some(ReadingUnit::Ohm);
+        }
+        match self.entry.column.to_lowercase().rsplit('_').next()? {
+            "ohm" | "ohms" | "kohm" => Some(ReadingUnit::Ohm),
+            "ratio" => Some(ReadingUnit::Ratio),
+            _ => None,
+        }
+    }
+
+    /// Doubts the unit of the readings once there are enough of them.
+    pub fn doubt(&mut self, reading: f64) -> Option<String> {
+        if !reading.is_finite() || self.early.len() >= FIRST_LIVE_READINGS {
+            return None;
+        }
+        self.early.push(reading);
+        if self.early.len() < FIRST_LIVE_READINGS { None } else { self.unit_doubt() }
+    }
+
+    /// Doubts it where the recording has ended before.
+    pub fn last_doubt(&self) -> Option<String> {
+        if self.early.len() < FIRST_LIVE_READINGS { self.unit_doubt() } else { None }
+    }
+
+    fn unit_doubt(&self) -> Option<String> {
+        let doubt = self.sensor.check_unit(self.early.iter().copied(), self.entry.rest_resistance).err()?;
+        let answer = match doubt.guess {
+            UnitGuess::KiloOhm => "Then say so with a line `# resistance_unit = kohm` above the header",
+            UnitGuess::CalibrationInKiloOhm => "Then calibrate again with `--unit resistance=kohm`",
+            _ => "Bring them to the sensor's unit",
+        };
+        Some(format!("joint `{}`: {doubt} {answer}", self.joint))
+    }
+}
+
+/// A header that fits a message.
+pub fn quoted(header: &str) -> String {
+    const LONGEST: usize = 80;
+    let shown: String = header.chars().take(LONGEST).collect();
+    if shown.len() < header.len() { format!("`{shown}…`") } else { format!("`{shown}`") }
+}

@@ -1,0 +1,45 @@
+use std::io::Write;
+
+use ohmstrain::Scores;
+use serde::Serialize;
+
+use crate::commands::score_table::{KEY, add_scores, score_table};
+use crate::error::CliError;
+
+/// Scores of a joint and of each of its channels alone.
+#[derive(Serialize)]
+pub struct JointScores {
+    /// Name of the joint.
+    pub joint: String,
+    /// Scores of what `hand` reports of it.
+    pub fused: Option<Scores>,
+    pub channels: Vec<ChannelScores>,
+}
+
+/// Scores of a channel by itself.
+#[derive(Serialize)]
+pub struct ChannelScores {
+    /// Column of its readings.
+    pub column: String,
+    pub alone: Option<Scores>,
+}
+
+/// Prints scores below a heading, as JSON or as a table.
+pub fn write(out: &mut dyn Write, heading: &str, joints: &[JointScores], is_json: bool) -> Result<(), CliError> {
+    if is_json {
+        serde_json::to_writer_pretty(&mut *out, &serde_json::json!({ "scored": heading, "joints": joints }))
+            .map_err(|error| CliError::Other(format!("cannot write JSON: {error}")))?;
+        return Ok(writeln!(out)?);
+    }
+    let mut table = score_table();
+    for JointScores { joint, fused, channels } in joints {
+        if let Some(scores) = fused {
+            add_scores(&mut table, joint, scores);
+        }
+        let alone = channels.iter().filter(|_| channels.len() > 1);
+        for ChannelScores { column, alone } in alone {
+            alone.iter().for_each(|scores| add_scores(&mut table, &format!("  {column} alone"), scores));
+        }
+    }
+    Ok(writeln!(out, "{heading}\n\n{table}\n\n{KEY}")?)
+}

@@ -1,0 +1,162 @@
+//! One recording of several channels: calibrated, fused, evaluated and run in one command each.
+
+use crate::common::{Bench, Csv, change_rows};
+
+/// Names of the channels.
+const CHANNELS: [&str; 3] = ["inner", "middle", "outer"];
+/// End of what is calibrated on, s.
+const UNTIL: &str = "100";
+
+/// A number in ±1 that looks like chance.
+fn noise(row: usize, channel: usize) -> f64 {
+    ((row * 3 + channel) as f64 * 12.9898).sin() * 43758.5453 % 1.0
+}
+
+/// A recording of 150 s: three channels with curves of their own see one strain, two of them its rate as well.
+fn knee() -> String {
+    let names: Vec<String> = CHANNELS.iter().map(|channel| format!("{channel}_ohm")).collect();
+    let mut text = format!("# sleeve = 7\ntime_s,{},strain\n", names.join(","));
+    let strain = |t: f64| 0.15 - 0.10 * (0.9 * t).cos() - 0.05 * (0.33 * t + 1.0).cos();
+    let mut drift = [0.0; CHANNELS.len()];
+    for row in 0..1500 {
+        let t = 0.1 * row as f64;
+        let (e, rate) = (strain(t), (strain(t) - strain(t - 0.1)) / 0.1);
+        let ln_r = [2.0 * e + 0.3 * rate, 3.0 * e - 2.0 * e * e, 1.5 * e + 3.0 * e * e - 0.2 * rate];
+        // Errors of readings are alike over five seconds.
+        for (channel, drift) in drift.iter_mut().enumerate() {
+            *drift = 0.98 * *drift + 0.2 * noise(row, channel + 7);
+        }
+        let error = |channel: usize| 0.01 * (noise(row, channel) + drift[channel]);
+        let ohm = |channel: usize| 1000.0 * (channel + 1) as f64 * (ln_r[channel] + error(channel)).exp();
+        text += &format!("{t:.1},{:.2},{:.2},{:.2},{e:.6}\n", ohm(0), ohm(1), ohm(2));
+    }
+    text
+}
+
+/// A folder with that recording and a quick calibration on its first 100 s, made once.
+fn bench() -> Bench {
+    static FILES: std::sync::OnceLock<Vec<(String, String)>> = std::sync::OnceLock::new();
+    let files = FILES.get_or_init(|| {
+        let bench = Bench::new();
+        bench.write("knee.csv", knee());
+        let calibrate = ["calibrate", "knee.csv", "--until", UNTIL, "-o", "knee.toml", "--estimator", "ekf", "--json"];
+        bench.write("left_out.json", bench.run(&calibrate).ok());
+        bench.files().into_iter().map(|name| (name.clone(), bench.read(&name))).collect()
+    });
+    let bench = Bench::new();
+    files.iter().for_each(|(name, content)| bench.write(name, content));
+    bench
+}
+
+/// Errors, % of full scale, and shares within the 95 % interval: of the joint, and of its best channel.
+fn scores(json: &str) -> ([f64; 2], f64) {
+    let json: serde_json::Value = serde_json::from_str(json).unwrap();
+    let joint = &json["joints"][0];
+    let channels = joint["channels"].as_array().unwrap();
+    assert_eq!(channels.len(), CHANNELS.len());
+    let error = |channel: &serde_json::Value| channel["alone"]["rmse_percent_fs"].as_f64().unwrap();
+    let best = channels.iter().map(error).fold(f64::INFINITY, f64::min);
+    ([joint["fused"]["rmse_percent_fs"].as_f64().unwrap(), joint["fused"]["coverage_95"].as_f64().unwrap()], best)
+}
+
+#[test]
+fn channels_of_one_strain_are_fused() {
+    let bench = bench();
+    let ([fused, covered], best) = scores(&bench.read("left_out.json"));
+    assert!(fused < best && covered > 0.9, "{fused} {best} {covered}");
+    let scored = bench.run(&["evaluate", "knee.csv", "--sensor", "knee.toml", "--from", UNTIL, "--json"]).ok();
+    let ([fused, covered], best) = scores(&scored);
+    // Three errors alike of which half of the variance were common to all would leave 0.82 of one.
+    assert!(fused < 0.82 * best && covered > 0.9, "{fused} {best} {covered}");
+    let table = bench.run(&["evaluate", "knee.csv", "--sensor", "knee.toml", "--from", UNTIL]).ok();
+    assert!(table.contains("| knee ") && table.contains("inner_ohm alone"), "{table}");
+
+    let angles = Csv::new(&bench.run(&["hand", "knee.toml", "knee.csv"]).ok());
+    assert_eq!(angles.header, "time_s,knee_strain,knee_strain_sd,flags");
+    assert_eq!(angles.len(), Csv::new(&bench.read("knee.csv")).len());
+    // The same again gives the same files, and replaces them without a word.
+    let before: Vec<String> = ["knee.toml", "knee-fusion.toml", "knee-outer.toml"].map(|name| bench.read(name)).into();
+    bench.run(&["calibrate", "knee.csv", "--until", UNTIL, "-o", "knee.toml", "--estimator", "ekf", "--quiet"]).ok();
+    let after: Vec<String> = ["knee.toml", "knee-fusion.toml", "knee-outer.toml"].map(|name| bench.read(name)).into();
+    assert_eq!(before, after);
+}
+
+/// A channel that is unplugged, or shorted, from 110 s on.
+#[test]
+fn a_channel_that_fails_leaves_the_others() {
+    let bench = bench();
+    let faulty = |cell: &str| {
+        change_rows(&bench.read("knee.csv"), |_, cells| {
+            if cells[0].parse::<f64>().is_ok_and(|time_s| time_s >= 110.0) {
+                cells[2] = cell.to_owned();
+            }
+        })
+    };
+    for (name, cell, flag) in [("open.csv", "", "middle_ohm:missing"), ("shorted.csv", "3", "middle_ohm:implausible")] {
+        bench.write(name, faulty(cell));
+        let scored = bench.run(&["evaluate", name, "--sensor", "knee.toml", "--from", UNTIL, "--json"]).ok();
+        let ([fused, covered], best) = scores(&scored);
+        assert!(fused < best && covered > 0.9, "{name}: {fused} {best} {covered}");
+        let angles = bench.run(&["hand", "knee.toml", name]).ok();
+        assert!(angles.lines().last().unwrap().contains(flag), "{name}: {}", angles.lines().last().unwrap());
+    }
+}
+
+#[test]
+fn what_is_wrong_with_several_channels_is_said() {
+    let bench = bench();
+    bench.write("bare.csv", bench.read("knee.csv").replace(",strain\n", ",x\n"));
+    bench.write("other.csv", bench.read("knee.csv").replace("outer_ohm", "thigh_ohm"));
+    bench.write("word.csv", bench.read("knee.csv").replacen("\n0.0,", "\n0.0,x", 1));
+    bench.write("mine.toml", "format = 1\n[[joints]]\nname = \"a\"\ncolumn = \"a_ohm\"\nsensor = \"a.toml\"\n");
+    bench.write("unfused.toml", bench.read("knee.toml").replace("fusion = \"knee-fusion.toml\"\n", ""));
+    bench.write("worse.toml", bench.read("knee.toml").replace("knee-fusion", "worse-fusion"));
+    bench.write("worse-fusion.toml", bench.read("knee-fusion.toml").replace("novelty = ", "novelty = -"));
+    for (arguments, code, message) in [
+        (
+            &["calibrate", "bare.csv", "-o", "out.toml"][..],
+            4,
+            "bare.csv:2: column `inner_ohm`: expected its reference, `inner_angle_deg`",
+        ),
+        (
+            &["calibrate", "knee.csv", "other.csv", "-o", "out.toml"],
+            4,
+            "other.csv:2: expected the channels of the first recording",
+        ),
+        (&["calibrate", "word.csv", "-o", "out.toml"], 4, "word.csv:3: column `inner_ohm`"),
+        (&["calibrate", "knee.csv", "-o", "out.toml", "--explain"], 2, "--explain is for recordings of one channel"),
+        (&["calibrate", "knee.csv", "-o", "mine.toml"], 2, "cannot write mine.toml: it holds something else"),
+        (&["hand", "unfused.toml", "knee.csv"], 4, "unfused.toml: joint `knee`: expected `fusion`"),
+        (&["hand", "worse.toml", "knee.csv"], 4, "worse-fusion.toml:"),
+        (&["evaluate", "knee.csv", "--sensor", "knee.toml", "--check"], 2, "--check is for one sensor"),
+        (
+            &["evaluate", "knee.toml", "--sensor", "knee.toml"],
+            4,
+            "knee.toml: expected a recording with two or more columns",
+        ),
+    ] {
+        let run = bench.run(arguments);
+        assert!(run.code == Some(code) && run.stderr.contains(message), "{arguments:?}: {:?} {}", run.code, run.stderr);
+    }
+    assert!(!std::path::Path::new(&bench.path("out.toml")).exists());
+}
+
+/// Two joints with a reference each: two sensors, none fused.
+#[test]
+fn each_reference_is_a_joint() {
+    let bench = bench();
+    let (header, rows) = ("inner_ohm,middle_ohm,outer_ohm,strain", bench.read("knee.csv"));
+    let two = rows.replace(header, "inner_ohm,middle_ohm,_,inner_strain");
+    let doubled: Vec<String> = two
+        .lines()
+        .map(|line| match line.rsplit_once(',') {
+            Some((_, "inner_strain")) => format!("{line},middle_strain"),
+            Some((_, strain)) => format!("{line},{strain}"),
+            None => line.to_owned(),
+        })
+        .collect();
+    bench.write("two.csv", doubled.join("\n") + "\n");
+    bench.run(&["calibrate", "two.csv", "--until", UNTIL, "-o", "two.toml", "--estimator", "ekf", "--quiet"]).ok();
+    let angles = Csv::new(&bench.run(&["hand", "two.toml", "two.csv"]).ok());
+    assert_eq!(angles.header, "time_s,inner_strain,inner_strain_sd,middle_strain,middle_strain_sd,flags");
+}

@@ -1,0 +1,225 @@
+use std::sync::Arc;
+
+#[cfg(feature = "calibrate")]
+use ohmstrain_calib::{FusionChannel, Samples, fit_fusion};
+use ohmstrain_model::Joint;
+use ohmstrain_sensor::Quantity;
+use ohmstrain_sensor::fusion::{ChannelState, FUSION_FORMAT, Fusion, FusionParams, Voice};
+
+use crate::text::{self, Document};
+#[cfg(feature = "calibrate")]
+use crate::{Calibrated, MADE_BY, Recording, Scores};
+use crate::{Error, Estimate, FieldError, Filter, Flag, Reading, Sensor};
+
+impl Document for FusionParams {
+    const FORMAT: u32 = FUSION_FORMAT;
+
+    fn check(&self) -> Result<(), FieldError> {
+        self.validate()
+    }
+}
+
+/// Several sensors that see one strain, with what their calibration found of how to fuse them.
+///
+/// ```no_run
+/// use ohmstrain::{FusedSensor, Sensor};
+///
+/// let sensors = vec![
+///     Sensor::from_toml(&std::fs::read_to_string("knee-knit1.toml")?)?,
+///     Sensor::from_toml(&std::fs::read_to_string("knee-knit2.toml")?)?,
+/// ];
+/// let knee = FusedSensor::from_toml(sensors, &std::fs::read_to_string("knee-fusion.toml")?)?;
+/// let mut filter = knee.filter()?;
+/// let e = filter.step(0.0, &[1.02.into(), 1.31.into()])?;
+/// println!("{:.1} ± {:.1}", e.strain, e.strain_sd);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct FusedSensor {
+    sensors: Vec<Sensor>,
+    params: Arc<FusionParams>,
+}
+
+impl FusedSensor {
+    /// Fuses sensors by the text of a fusion file.
+    ///
+    /// # Errors
+    /// With line and column if the text is no fusion, or if it is one of other sensors: of another number or quantity.
+    pub fn from_toml(sensors: Vec<Sensor>, text: &str) -> Result<Self, Error> {
+        Self::new(sensors, text::parse(text)?)
+    }
+
+    /// Fuses sensors by these parameters.
+    ///
+    /// # Errors
+    /// If they are of another number of sensors, or of another quantity.
+    pub fn new(sensors: Vec<Sensor>, params: FusionParams) -> Result<Self, Error> {
+        if sensors.len() != params.channels() {
+            return Err(Error::OtherChannels { expected: params.channels(), found: sensors.len() });
+        }
+        if sensors.iter().any(|sensor| sensor.params().quantity != params.quantity) {
+            return Err(Error::OtherQuantity);
+        }
+        Ok(Self { sensors, params: Arc::new(params) })
+    }
+
+    /// The text of its fusion file: what [`Self::from_toml`] reads.
+    ///
+    /// # Errors
+    /// If TOML cannot hold a number.
+    pub fn to_toml(&self) -> Result<String, Error> {
+        Ok(toml::to_string(self.params.as_ref())?)
+    }
+
+    /// The sensors of its channels.
+    #[must_use]
+    pub fn sensors(&self) -> &[Sensor] {
+        &self.sensors
+    }
+
+    /// All its numbers but those of the sensors.
+    #[must_use]
+    pub fn params(&self) -> &FusionParams {
+        &self.params
+    }
+
+    /// The quantity that it estimates.
+    #[must_use]
+    pub fn quantity(&self) -> Quantity {
+        self.params.quantity
+    }
+
+    /// A filter of all channels, each with the default estimator of its sensor.
+    ///
+    /// # Errors
+    /// If a filter of a channel cannot be made.
+    pub fn filter(&self) -> Result<FusedFilter, Error> {
+        let filters = self.sensors.iter().map(|sensor| sensor.filter().build()).collect::<Result<_, _>>()?;
+        self.filter_of(filters)
+    }
+
+    /// A filter of these filters of its sensors, in their order: with another R₀, for one.
+    ///
+    /// # Errors
+    /// If they are of another number, or the joint of the first sensor is none.
+    pub fn filter_of(&self, filters: Vec<Filter>) -> Result<FusedFilter, Error> {
+        if filters.len() != self.sensors.len() {
+            return Err(Error::OtherChannels { expected: self.sensors.len(), found: filters.len() });
+        }
+        let with_joint = self.sensors.iter().find(|sensor| sensor.params().joint.is_some());
+        let joint = with_joint.map(Sensor::joint).transpose()?.flatten();
+        Ok(FusedFilter { filters, fusion: Fusion::new(Arc::clone(&self.params)), joint })
+    }
+}
+
+/// A running filter of several channels: their readings in, one estimate out.
+pub struct FusedFilter {
+    filters: Vec<Filter>,
+    fusion: Fusion,
+    joint: Option<Joint<f64>>,
+}
+
+/// Estimate of one strain from several channels.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct FusedEstimate {
+    /// Time, s.
+    pub time_s: f64,
+    /// Strain, or what the sensors were calibrated on.
+    pub strain: f64,
+    /// Its standard deviation.
+    pub strain_sd: f64,
+    /// Angle of the joint, degrees; `None` without a joint.
+    pub angle_deg: Option<f64>,
+    /// Its standard deviation.
+    pub angle_sd: Option<f64>,
+    /// Index of the channel that disagrees with all others: it was left out.
+    pub faulty: Option<usize>,
+    /// True if the readings together are unlike any of the calibration: the interval is nearly that of an unknown strain.
+    pub is_unlike: bool,
+    /// Estimates of the channels by themselves.
+    pub channels: Vec<Estimate>,
+}
+
+impl FusedFilter {
+    /// Takes a reading of each channel. A missing one is NaN, `None` or [`Reading::MISSING`].
+    ///
+    /// # Errors
+    /// If there are more or fewer readings than channels, or time goes backwards. The filter stays as it was.
+    pub fn step(&mut self, time_s: f64, readings: &[Reading]) -> Result<FusedEstimate, Error> {
+        if readings.len() != self.filters.len() {
+            return Err(Error::OtherChannels { expected: self.filters.len(), found: readings.len() });
+        }
+        let each = self.filters.iter_mut().zip(readings);
+        let channels = each.map(|(filter, reading)| filter.step(time_s, *reading)).collect::<Result<Vec<_>, _>>()?;
+        let states: Vec<ChannelState> =
+            self.filters.iter().zip(&channels).map(|(filter, row)| state(filter, row)).collect();
+        let fused = self.fusion.step(time_s, &states);
+        let angle = self.joint.map(|joint| joint.angle_rad(fused.strain, fused.sd));
+        Ok(FusedEstimate {
+            time_s,
+            strain: fused.strain,
+            strain_sd: fused.sd,
+            angle_deg: angle.map(|(angle, _)| angle.to_degrees()),
+            angle_sd: angle.map(|(_, sd)| sd.to_degrees()),
+            faulty: fused.faulty,
+            is_unlike: fused.is_unlike,
+            channels,
+        })
+    }
+}
+
+/// State of a channel for the fusion: no reading that its own filter does not believe.
+fn state(filter: &Filter, row: &Estimate) -> ChannelState {
+    const UNREAD: [Flag; 4] = [Flag::Missing, Flag::Saturated, Flag::Implausible, Flag::Stuck];
+    let is_read = !UNREAD.iter().any(|flag| row.flags.has(*flag));
+    let reading = row.resistance.filter(|reading| is_read && *reading > 0.0);
+    ChannelState {
+        ln_r: reading.map_or(f64::NAN, |reading| (reading / filter.rest_reading()).ln()),
+        own: Voice { strain: row.strain, sd: row.strain_sd },
+    }
+}
+
+/// Fused sensor with its quality on parts that calibration left out.
+#[cfg(feature = "calibrate")]
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Fused {
+    /// The sensor.
+    pub sensor: FusedSensor,
+    /// Scores of the fused estimate; `None` if they could not be measured.
+    pub scores: Option<Scores>,
+    /// Scores of each channel alone on the same rows.
+    pub channels: Vec<Option<Scores>>,
+}
+
+/// Fuses channels that see one strain. Each comes with its calibration and the recordings that this was made of; their rows have the same
+/// times and strains.
+///
+/// # Errors
+/// If there are less than two channels, if they are of different quantities, or if their recordings have no rows in common.
+///
+/// ```no_run
+/// use ohmstrain::{Calibration, Recording, fuse};
+///
+/// fn knee(first: Recording, second: Recording) -> Result<ohmstrain::FusedSensor, ohmstrain::Error> {
+///     let calibrated = [Calibration::new().run(&[first])?, Calibration::new().run(&[second])?];
+///     Ok(fuse(&[(&calibrated[0], &[first]), (&calibrated[1], &[second])])?.sensor)
+/// }
+/// ```
+#[cfg(feature = "calibrate")]
+pub fn fuse(channels: &[(&Calibrated, &[Recording])]) -> Result<Fused, Error> {
+    let sensors: Vec<Sensor> = channels.iter().map(|(calibrated, _)| calibrated.sensor.clone()).collect();
+    let mut samples: Vec<Vec<Samples>> = Vec::new();
+    for (_, recordings) in channels {
+        samples.push(recordings.iter().map(|recording| recording.samples).collect());
+    }
+    let mut learned = Vec::new();
+    for ((calibrated, _), samples) in channels.iter().zip(&samples) {
+        let rest_reading = calibrated.sensor.params().rest_reading;
+        learned.push(FusionChannel { recordings: samples, rest_reading, left_out: &calibrated.left_out });
+    }
+    let quantity = sensors.first().map_or(Quantity::Strain, |sensor| sensor.params().quantity);
+    let fit = fit_fusion(&learned, quantity, MADE_BY)?;
+    Ok(Fused { sensor: FusedSensor::new(sensors, fit.params)?, scores: fit.fused, channels: fit.channels })
+}

@@ -1,0 +1,157 @@
+//! Several channels that see one strain, fused: the channels' filters, and regressions on all their readings at once, weighted by how
+//! their errors vary together in parts that calibration left out.
+//!
+//! Readings of one strain lie near those of the calibration. A row that does not is looked at without each channel in turn: where that
+//! explains it, the channel is faulty and left out; where nothing does, the body moves as it did not in calibration, and no voice is
+//! worth what it says.
+
+mod combine;
+mod low_passes;
+mod novelty;
+mod params;
+mod regression;
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+pub use combine::{Voice, combine};
+pub use low_passes::LowPasses;
+pub use novelty::distance;
+pub use params::{FUSION_FORMAT, FusionParams, FusionRow, MOST_CHANNELS, RegressionParams};
+pub use regression::{PRIOR_SD, Regression, Seen};
+
+/// Multiple of [`FusionParams::novelty`] beyond which a row is unlike the calibration.
+pub const UNLIKE: f64 = 1.5;
+/// Channels that must be left to say that another one is faulty.
+const FEWEST_WITNESSES: usize = 2;
+/// Sets of channels whose regressions are kept.
+const MOST_SETS: usize = 8;
+
+/// State of a channel at one time.
+#[derive(Clone, Copy, Debug)]
+pub struct ChannelState {
+    /// ln R/R₀; NaN for a missing or implausible reading.
+    pub ln_r: f64,
+    /// Strain of the channel's own filter.
+    pub own: Voice,
+}
+
+/// Fused estimate.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fused {
+    /// Strain.
+    pub strain: f64,
+    /// Its standard deviation.
+    pub sd: f64,
+    /// Index of the channel that disagrees with all others and was left out.
+    pub faulty: Option<usize>,
+    /// True if the readings are unlike any of the calibration, and no single channel explains it.
+    pub is_unlike: bool,
+}
+
+/// A running fusion.
+#[derive(Clone, Debug)]
+pub struct Fusion {
+    params: Arc<FusionParams>,
+    low_passes: LowPasses,
+    /// Regressions on sets of channels, those used last at the end.
+    conditioned: VecDeque<Conditioned>,
+}
+
+/// Regressions that see some of the channels.
+#[derive(Clone, Debug)]
+struct Conditioned {
+    channels: Vec<usize>,
+    /// One for each of the parameters; `None` where the numbers allow none.
+    regressions: Arc<Vec<Option<Regression>>>,
+}
+
+impl Fusion {
+    /// A fusion that has seen nothing.
+    #[must_use]
+    pub fn new(params: Arc<FusionParams>) -> Self {
+        let low_passes = LowPasses::new(&params.low_pass_s, params.channels());
+        Self { params, low_passes, conditioned: VecDeque::new() }
+    }
+
+    /// Fuses the channels at a time.
+    pub fn step(&mut self, time_s: f64, channels: &[ChannelState]) -> Fused {
+        let mut ln_r: Vec<f64> = channels.iter().map(|channel| channel.ln_r).collect();
+        let params = Arc::clone(&self.params);
+        let (faulty, novelty) = params.faulty(&ln_r);
+        if let Some(faulty) = faulty {
+            ln_r[faulty] = f64::NAN;
+        }
+        self.low_passes.step(time_s, &ln_r);
+        let read: Vec<usize> = (0..ln_r.len()).filter(|&channel| ln_r[channel].is_finite()).collect();
+        let regressions = self.regressions(&read);
+        let seen = Seen { ln_r: &ln_r, low_passed: self.low_passes.states() };
+        let mut voices: Vec<Voice> = channels.iter().map(|channel| channel.own).collect();
+        if let Some(faulty) = faulty {
+            voices[faulty] = Voice::UNKNOWN;
+        }
+        let told = |one: &Option<Regression>| one.as_ref().map_or(Voice::UNKNOWN, |one| one.strain(seen));
+        voices.extend(regressions.iter().map(told));
+        let limits = params.limits;
+        let nothing = Voice { strain: 0.5 * (limits.lower + limits.upper), sd: limits.span() };
+        let fused = params.fused(&voices, novelty).unwrap_or(nothing);
+        Fused { strain: fused.strain.clamp(limits.lower, limits.upper), sd: fused.sd, faulty, is_unlike: novelty > 0.0 }
+    }
+
+    /// Regressions on these channels, made when they are first asked for.
+    fn regressions(&mut self, channels: &[usize]) -> Arc<Vec<Option<Regression>>> {
+        let place = self.conditioned.iter().position(|one| one.channels == channels);
+        let known = place.and_then(|place| self.conditioned.remove(place));
+        let one = known.unwrap_or_else(|| Conditioned {
+            channels: channels.to_vec(),
+            regressions: Arc::new(self.params.conditioned(channels)),
+        });
+        if self.conditioned.len() == MOST_SETS {
+            self.conditioned.pop_front();
+        }
+        let regressions = Arc::clone(&one.regressions);
+        self.conditioned.push_back(one);
+        regressions
+    }
+}
+
+impl FusionParams {
+    /// Regressions on these channels; `None` for each if there is no channel.
+    fn conditioned(&self, channels: &[usize]) -> Vec<Option<Regression>> {
+        let rows: Vec<&FusionRow> = self.rows.iter().collect();
+        let span = self.limits.span();
+        self.regressions.iter().map(|params| Regression::new(&rows, params, channels, span)).collect()
+    }
+
+    /// Index of the channel without which the readings are like some of the calibration, if they are not with it; and by how much they
+    /// are unlike them, 0 to 1, if there is no such channel.
+    fn faulty(&self, ln_r: &[f64]) -> (Option<usize>, f64) {
+        let unlike = |ln_r: &[f64]| {
+            distance(ln_r, self.rows.iter().map(|row| row.ln_r.as_slice()), &self.channel_sd) / self.novelty
+        };
+        let all = unlike(ln_r);
+        if all <= UNLIKE {
+            return (None, 0.0);
+        }
+        let read: Vec<usize> = (0..ln_r.len()).filter(|&channel| ln_r[channel].is_finite()).collect();
+        let without = |channel: &usize| {
+            let mut others = ln_r.to_vec();
+            others[*channel] = f64::NAN;
+            (*channel, unlike(&others))
+        };
+        let nearest = read.iter().map(without).min_by(|a, b| a.1.total_cmp(&b.1));
+        let explains = nearest.filter(|(_, unlike)| *unlike <= 1.0 && read.len() > FEWEST_WITNESSES);
+        explains.map_or_else(|| (None, (all - UNLIKE).min(1.0)), |(channel, _)| (Some(channel), 0.0))
+    }
+
+    /// The voices together, as far as readings that are unlike the calibration's (0 to 1) let them count: each voice, and all of them
+    /// together, may then be off by the prior's standard deviation.
+    #[must_use]
+    pub fn fused(&self, voices: &[Voice], novelty: f64) -> Option<Voice> {
+        let prior = novelty * (PRIOR_SD * self.limits.span()).powi(2);
+        let doubted = |voice: &Voice| Voice { sd: (voice.sd * voice.sd + prior).sqrt(), ..*voice };
+        let voices: Vec<Voice> = voices.iter().map(doubted).collect();
+        let fused = combine(&voices, |i, j| self.error_covariance[i][j])?;
+        Some(Voice { strain: fused.strain, sd: self.sd_scale * (fused.sd * fused.sd + prior).sqrt() })
+    }
+}

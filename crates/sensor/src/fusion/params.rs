@@ -1,0 +1,127 @@
+use serde::{Deserialize, Serialize};
+
+use crate::params::Quantity;
+use crate::params::range::RangeParams;
+use crate::params::validate::FieldError;
+use crate::params::validate::table::{Allowed, FACTOR, POSITIVE, SIGNED, Table};
+
+/// Version of the fusion file this code reads and writes.
+pub const FUSION_FORMAT: u32 = 1;
+/// Most channels of one strain.
+pub const MOST_CHANNELS: usize = 32;
+const COVARIANCE: Allowed = Allowed { least: -1e9, most: 1e9 };
+/// Noise of a regression: without any, rows that repeat make its matrix singular.
+const NOISE: Allowed = Allowed { least: 1e-4, most: 1.0 };
+
+/// Fusion of several channels that see one strain: the content of a fusion file.
+///
+/// Its voices are the channels' filters, in order, and then the regressions of the strain on all readings.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FusionParams {
+    /// Version of the format, [`FUSION_FORMAT`].
+    pub format: u32,
+    /// Program and version that made it.
+    pub made_by: String,
+    /// Factor on the fused standard deviation, from blocks left out.
+    pub sd_scale: f64,
+    /// The estimated quantity.
+    pub quantity: Quantity,
+    /// Range of the output.
+    pub limits: RangeParams,
+    /// Squared distance from the calibration's readings, per channel, that one row in a hundred exceeds in blocks left out.
+    pub novelty: f64,
+    /// Typical difference of ln R of each channel between rows in which the others agree.
+    pub channel_sd: Vec<f64>,
+    /// Covariances of the voices' errors in blocks left out, in units of their deviations, correlations shrunken; no variance is below one.
+    pub error_covariance: Vec<Vec<f64>>,
+    /// Time constants of the low-passes of ln R, s.
+    pub low_pass_s: Vec<f64>,
+    /// Regressions of the strain on all channels' readings.
+    pub regressions: Vec<RegressionParams>,
+    /// Rows of the calibration.
+    pub rows: Vec<FusionRow>,
+}
+
+/// Parameters of a Gaussian process of the strain.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RegressionParams {
+    /// Indices into [`FusionParams::low_pass_s`]: inputs are ln R of each channel and its difference from these low-passes.
+    pub low_passes: Vec<usize>,
+    /// Length scale of all inputs, in standard deviations of the input.
+    pub length: f64,
+    /// Standard deviation of the noise, as a share of the range of the strain.
+    pub noise: f64,
+}
+
+/// A row of the calibration.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FusionRow {
+    /// True strain.
+    pub strain: f64,
+    /// ln R/R₀ of each channel.
+    pub ln_r: Vec<f64>,
+    /// Low-passes of it: one list of channels for each time constant.
+    pub low_passed: Vec<Vec<f64>>,
+}
+
+impl FusionParams {
+    /// Number of channels.
+    #[must_use]
+    pub const fn channels(&self) -> usize {
+        self.channel_sd.len()
+    }
+
+    /// Checks every number.
+    ///
+    /// # Errors
+    /// Names the first that is outside of its range, or a list of another length than the channels ask for.
+    pub fn validate(&self) -> Result<(), FieldError> {
+        let root = Table::root();
+        self.limits.validate(&root.table("limits"))?;
+        root.number("sd_scale", self.sd_scale, FACTOR)?;
+        root.number("novelty", self.novelty, POSITIVE)?;
+        root.numbers("channel_sd", &self.channel_sd, POSITIVE)?;
+        if !(2..=MOST_CHANNELS).contains(&self.channels()) {
+            return Err(root.wrong("channel_sd", format!("2 to {MOST_CHANNELS} entries"), self.channels()));
+        }
+        if self.rows.is_empty() {
+            return Err(root.wrong("rows", "at least one", 0));
+        }
+        root.numbers("low_pass_s", &self.low_pass_s, POSITIVE)?;
+        let voices = self.channels() + self.regressions.len();
+        root.length("error_covariance", voices, self.error_covariance.len())?;
+        for of_voice in &self.error_covariance {
+            root.length("error_covariance", voices, of_voice.len())?;
+            root.numbers("error_covariance", of_voice, COVARIANCE)?;
+        }
+        for (index, regression) in self.regressions.iter().enumerate() {
+            regression.validate(&root.entry("regressions", index), self.low_pass_s.len())?;
+        }
+        self.rows.iter().enumerate().try_for_each(|(index, row)| self.check_row(&root.entry("rows", index), row))
+    }
+
+    fn check_row(&self, table: &Table, row: &FusionRow) -> Result<(), FieldError> {
+        table.number("strain", row.strain, SIGNED)?;
+        table.length("ln_r", self.channels(), row.ln_r.len())?;
+        table.numbers("ln_r", &row.ln_r, SIGNED)?;
+        table.length("low_passed", self.low_pass_s.len(), row.low_passed.len())?;
+        row.low_passed.iter().try_for_each(|of_channels| {
+            table.length("low_passed", self.channels(), of_channels.len())?;
+            table.numbers("low_passed", of_channels, SIGNED)
+        })
+    }
+}
+
+impl RegressionParams {
+    fn validate(&self, table: &Table, low_passes: usize) -> Result<(), FieldError> {
+        table.number("length", self.length, POSITIVE)?;
+        table.number("noise", self.noise, NOISE)?;
+        match self.low_passes.iter().find(|index| **index >= low_passes) {
+            Some(index) => Err(table.wrong("low_passes", format!("less than {low_passes}"), index)),
+            None => Ok(()),
+        }
+    }
+}

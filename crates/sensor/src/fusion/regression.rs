@@ -1,0 +1,188 @@
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use super::combine::Voice;
+use super::params::{FusionRow, RegressionParams};
+
+/// Prior standard deviation of the strain, as a share of its range: that of any strain within it.
+pub const PRIOR_SD: f64 = 0.4;
+
+/// ln R/R₀ of all channels at one time, and its low-passes.
+#[derive(Clone, Copy)]
+pub struct Seen<'a> {
+    /// ln R/R₀ of each channel; NaN where it is not used.
+    pub ln_r: &'a [f64],
+    /// Low-passes of it, for each time constant.
+    pub low_passed: &'a [Vec<f64>],
+}
+
+impl<'a> From<&'a FusionRow> for Seen<'a> {
+    fn from(row: &'a FusionRow) -> Self {
+        Self { ln_r: &row.ln_r, low_passed: &row.low_passed }
+    }
+}
+
+/// A Gaussian process of the strain, conditioned on rows of the calibration, that sees some of the channels. Its kernel is a squared
+/// exponential and a linear one.
+///
+/// Source: C. E. Rasmussen, C. K. I. Williams, *Gaussian Processes for Machine Learning* (2006), algorithm 2.1.
+#[derive(Clone, Debug)]
+pub struct Regression {
+    channels: Vec<usize>,
+    params: RegressionParams,
+    /// Range of the strain.
+    span: f64,
+    mean_strain: f64,
+    /// Mean of each input and one over its standard deviation.
+    scale: Vec<(f64, f64)>,
+    /// Inputs of each row, scaled.
+    inputs: Vec<Vec<f64>>,
+    factor: Cholesky<f64, Dyn>,
+    weights: DVector<f64>,
+}
+
+impl Regression {
+    /// Conditions a process that sees `channels` on rows; `None` if there are no rows or no channels, or if the numbers allow none.
+    #[must_use]
+    pub fn new(rows: &[&FusionRow], params: &RegressionParams, channels: &[usize], span: f64) -> Option<Self> {
+        let of_row = |row: &&FusionRow| raw_inputs(params, channels, Seen::from(*row)).collect::<Vec<f64>>();
+        if channels.is_empty() {
+            return None;
+        }
+        let raw: Vec<Vec<f64>> = rows.iter().map(of_row).collect();
+        let scale: Vec<(f64, f64)> = (0..raw.first()?.len()).map(|input| location(&raw, input)).collect();
+        let inputs: Vec<Vec<f64>> = raw.iter().map(|row| scaled(row.iter().copied(), &scale)).collect();
+        let mean_strain = rows.iter().map(|row| row.strain).sum::<f64>() / rows.len() as f64;
+        let noise = params.noise * params.noise;
+        let covariance = DMatrix::from_fn(rows.len(), rows.len(), |i, j| {
+            kernel(&inputs[i], &inputs[j], params.length) + if i == j { noise } else { 0.0 }
+        });
+        let factor = covariance.cholesky()?;
+        let targets = DVector::from_iterator(rows.len(), rows.iter().map(|row| (row.strain - mean_strain) / span));
+        let weights = factor.solve(&targets);
+        Some(Self {
+            channels: channels.to_vec(),
+            params: params.clone(),
+            span,
+            mean_strain,
+            scale,
+            inputs,
+            factor,
+            weights,
+        })
+    }
+
+    /// The strain, its noise included.
+    #[must_use]
+    pub fn strain(&self, seen: Seen) -> Voice {
+        let input = scaled(raw_inputs(&self.params, &self.channels, seen), &self.scale);
+        let of_row = |row: &Vec<f64>| kernel(&input, row, self.params.length);
+        let mut covariance = DVector::from_iterator(self.inputs.len(), self.inputs.iter().map(of_row));
+        let mean = covariance.dot(&self.weights);
+        self.factor.l_dirty().solve_lower_triangular_mut(&mut covariance);
+        let prior = kernel(&input, &input, self.params.length);
+        // Rounding may take more from the variance than there is.
+        let variance = (prior - covariance.norm_squared()).max(0.0) + self.params.noise * self.params.noise;
+        Voice { strain: self.mean_strain + mean * self.span, sd: variance.sqrt() * self.span }
+    }
+}
+
+/// Inputs of a row: ln R of each channel and, for each low-pass, its difference from that.
+fn raw_inputs<'a>(
+    params: &'a RegressionParams,
+    channels: &'a [usize],
+    seen: Seen<'a>,
+) -> impl Iterator<Item = f64> + 'a {
+    let above = move |low_passed: &'a [f64]| channels.iter().map(move |&c| seen.ln_r[c] - low_passed[c]);
+    let readings = channels.iter().map(move |&c| seen.ln_r[c]);
+    readings.chain(params.low_passes.iter().flat_map(move |&index| above(&seen.low_passed[index])))
+}
+
+/// Mean and one over the standard deviation of an input; a constant one counts for nothing.
+fn location(rows: &[Vec<f64>], input: usize) -> (f64, f64) {
+    let n = rows.len() as f64;
+    let mean = rows.iter().map(|row| row[input]).sum::<f64>() / n;
+    let sd = (rows.iter().map(|row| (row[input] - mean).powi(2)).sum::<f64>() / n).sqrt();
+    (mean, if sd > 1e-9 { 1.0 / sd } else { 0.0 })
+}
+
+fn scaled(raw: impl Iterator<Item = f64>, scale: &[(f64, f64)]) -> Vec<f64> {
+    raw.zip(scale).map(|(value, (mean, per_sd))| (value - mean) * per_sd).collect()
+}
+
+fn kernel(a: &[f64], b: &[f64], length: f64) -> f64 {
+    let (mut squared, mut product) = (0.0, 0.0);
+    for (a, b) in a.iter().zip(b) {
+        squared += (a - b) * (a - b);
+        product += a * b;
+    }
+    PRIOR_SD * PRIOR_SD * ((-0.5 * squared / (length * length)).exp() + product / a.len() as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{DMatrix, DVector};
+
+    use super::{FusionRow, PRIOR_SD, Regression, RegressionParams, Seen};
+
+    fn row(strain: f64, first: f64, second: f64) -> FusionRow {
+        FusionRow { strain, ln_r: vec![first, second], low_passed: vec![vec![0.5 * first, 0.9 * second]] }
+    }
+
+    /// The same from the textbook's equations 2.25 and 2.26 with an inverse, the inputs scaled by hand.
+    #[test]
+    fn a_process_is_that_of_the_textbook() {
+        let rows =
+            [row(0.0, 0.0, 0.1), row(0.1, 0.3, 0.2), row(0.2, 0.5, 0.6), row(0.3, 0.9, 0.7), row(0.15, 0.4, 0.5)];
+        let params = RegressionParams { low_passes: vec![0], length: 1.5, noise: 0.05 };
+        let all: Vec<&FusionRow> = rows.iter().collect();
+        let regression = Regression::new(&all, &params, &[0, 1], 0.3).unwrap();
+        let inputs = |row: &FusionRow| {
+            let [a, b] = [row.ln_r[0], row.ln_r[1]];
+            [a, b, a - row.low_passed[0][0], b - row.low_passed[0][1]]
+        };
+        let raw: Vec<[f64; 4]> = rows.iter().map(inputs).collect();
+        let mean: Vec<f64> = (0..4).map(|i| raw.iter().map(|x| x[i]).sum::<f64>() / 5.0).collect();
+        let sd: Vec<f64> =
+            (0..4).map(|i| (raw.iter().map(|x| (x[i] - mean[i]).powi(2)).sum::<f64>() / 5.0).sqrt()).collect();
+        let scaled = |x: &[f64; 4]| -> Vec<f64> { (0..4).map(|i| (x[i] - mean[i]) / sd[i]).collect() };
+        let kernel = |a: &[f64], b: &[f64]| {
+            let squared: f64 = a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum();
+            let product: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
+            0.16 * ((-squared / 4.5).exp() + product / 4.0)
+        };
+        let x: Vec<Vec<f64>> = raw.iter().map(scaled).collect();
+        let noisy = DMatrix::from_fn(5, 5, |i, j| kernel(&x[i], &x[j]) + if i == j { 0.0025 } else { 0.0 });
+        let inverse = noisy.try_inverse().unwrap();
+        let mean_strain = rows.iter().map(|row| row.strain).sum::<f64>() / 5.0;
+        let targets = DVector::from_iterator(5, rows.iter().map(|row| (row.strain - mean_strain) / 0.3));
+        let new = row(0.0, 0.7, 0.4);
+        let at = scaled(&inputs(&new));
+        let k = DVector::from_iterator(5, x.iter().map(|row| kernel(row, &at)));
+        let expected = mean_strain + 0.3 * (k.transpose() * &inverse * &targets)[0];
+        let variance = kernel(&at, &at) - (k.transpose() * &inverse * &k)[0] + 0.0025;
+        let found = regression.strain(Seen::from(&new));
+        // The inverse of a matrix whose condition is below 1e4 loses four digits of sixteen.
+        assert!((found.strain - expected).abs() < 1e-11, "{found:?} {expected}");
+        assert!((found.sd - 0.3 * variance.sqrt()).abs() < 1e-11, "{found:?}");
+    }
+
+    /// Far from all rows in a direction that no row went, the strain is as unknown as before, or more.
+    #[test]
+    fn what_no_row_has_shown_is_unknown() {
+        let rows: Vec<FusionRow> =
+            (0..20).map(|k| row(0.015 * f64::from(k), 0.05 * f64::from(k), 0.06 * f64::from(k % 7))).collect();
+        let all: Vec<&FusionRow> = rows.iter().collect();
+        let params = RegressionParams { low_passes: vec![0], length: 1.0, noise: 0.01 };
+        let regression = Regression::new(&all, &params, &[0, 1], 0.3).unwrap();
+        let near = regression.strain(Seen::from(&rows[7]));
+        let far = regression.strain(Seen::from(&row(0.0, 0.5, 30.0)));
+        assert!(near.sd < 0.05 * 0.3 && far.sd > PRIOR_SD * 0.3, "{near:?} {far:?}");
+    }
+
+    #[test]
+    fn no_channel_tells_nothing() {
+        let params = RegressionParams { low_passes: vec![], length: 1.0, noise: 0.01 };
+        assert!(Regression::new(&[&row(0.1, 0.1, 0.1)], &params, &[], 0.3).is_none());
+        assert!(Regression::new(&[], &params, &[0], 0.3).is_none());
+    }
+}
