@@ -79,7 +79,7 @@ fn calibrate() {
 
 #[test]
 fn filter() {
-    holds(&run("filter.md"), &["estimates.csv", "smoothed.csv", "angles.csv"]);
+    holds(&run("filter.md"), &["estimates.csv", "smoothed.csv", "hand.toml", "hand-thumb.toml", "strains.csv"]);
 }
 
 /// Both sketches compile: the new one with the library that the page exports.
