@@ -12,6 +12,8 @@ const MOST_POINTS = 800;
 const WORDS_MS = 150;
 /** Up to so many rows a second there are half as many frames: nobody sees more, and a laptop lasts longer. */
 const CALM = 300;
+/** Last rows whose times tell how many there are in a second. */
+const RECENT = 100;
 /** Numbers of a row: time, reading, strain, deviation. */
 const WIDTH = 4;
 
@@ -160,7 +162,7 @@ export class LiveView {
       return;
     }
     const now = performance.now();
-    const isCalm = times.length < CALM * ((times.at(-1) ?? 0) - (times[0] ?? 0));
+    const isCalm = RECENT < CALM * ((times.at(-1) ?? 0) - (times.at(-1 - RECENT) ?? Number.NEGATIVE_INFINITY));
     if (isCalm && now - this.drawnAt < 25) {
       requestAnimationFrame(() => this.draw());
       return;

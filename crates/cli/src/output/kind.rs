@@ -69,9 +69,9 @@ impl Kind {
             Self::Sensor => {
                 let (is_own, third) = (is_format(line()) && is_made_by_toml(line()), line());
                 let others = ["sensors = ", "sensor = ", FUSION];
-                is_own && !third.is_empty() && !others.iter().any(|other| third.starts_with(other))
+                is_own && !is_hand(head) && !others.iter().any(|other| third.starts_with(other))
             }
-            Self::Hand => is_format(line()) && is_made_by_toml(line()) && line().is_empty() && line() == "[[joints]]",
+            Self::Hand => is_hand(head),
             Self::Fusion => is_format(line()) && is_made_by_toml(line()) && line().starts_with(FUSION),
             Self::Prior => is_format(line()) && is_made_by_toml(line()) && line().starts_with("sensors = "),
             Self::State => is_format(line()) && is_made_by_toml(line()) && line().starts_with("sensor = "),
@@ -93,6 +93,12 @@ impl Kind {
             _ => false,
         }
     }
+}
+
+/// True if this is the description of a hand that this program wrote.
+fn is_hand(head: &str) -> bool {
+    let lines: Vec<&str> = head.lines().take(4).collect();
+    matches!(lines[..], [format, made_by, "", "[[joints]]"] if is_format(format) && is_made_by_toml(made_by))
 }
 
 /// Third line of a fusion.
