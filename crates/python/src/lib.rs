@@ -8,6 +8,7 @@ mod calibration;
 mod doubts;
 mod error;
 mod evaluation;
+mod fused;
 mod live;
 mod options;
 mod read;
@@ -25,6 +26,8 @@ mod _core {
     use super::calibration::{calibrate, check_prior, evaluate_split, fit_prior};
     #[pymodule_export]
     use super::error::OhmstrainError;
+    #[pymodule_export]
+    use super::fused::{FusedFilter, FusedSensor};
     #[pymodule_export]
     use super::live::{LaggedFilter, LiveFilter};
     #[pymodule_export]

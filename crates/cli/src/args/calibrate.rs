@@ -7,10 +7,10 @@ use super::{Auto, Branches, Estimator, Gauge, ReplaceArgs, UnitArgs, finite};
 /// Flags of `calibrate`.
 #[derive(Debug, ClapArgs)]
 pub struct CalibrateArgs {
-    /// Recordings with a reference
+    /// Recordings with a reference, of one channel, or with a column NAME_ohm or NAME_ratio for each of several
     #[arg(required = true)]
     pub traces: Vec<PathBuf>,
-    /// File to write the sensor's parameters to
+    /// File to write the sensor's parameters to; for several channels hand.toml, with the sensors beside it
     #[arg(short, long, value_name = "sensor.toml")]
     pub output: PathBuf,
     /// Use rows with time_s >= T only

@@ -80,7 +80,7 @@ impl EvaluateArgs {
 #[derive(Debug, ClapArgs)]
 #[group(required = true, multiple = false)]
 pub struct CalibrationSource {
-    /// The sensor's parameters
+    /// The sensor's parameters, or a hand.toml for recordings of several channels
     #[arg(long, value_name = "sensor.toml")]
     pub sensor: Option<PathBuf>,
     /// Calibrate on this share of the rows of each recording, the first ones, and score the rest; SHARE:reversed calibrates

@@ -37,4 +37,10 @@ hand.toml:
   joint = \"prestrain=0.05 moment_arm_mm=4.4 gauge_length_mm=30\"
   rest_resistance = 1612.0        # R0 of today, if it is not the calibration's
   # if the column has converter codes:
-  front_end = \"divider reference_ohm=10000 side=low bits=12 noise_codes=0.5\"";
+  front_end = \"divider reference_ohm=10000 side=low bits=12 noise_codes=0.5\"
+  [[joints]]                      # of several channels that see one strain, as calibrate wrote it
+  name = \"knee\"
+  fusion = \"knee-fusion.toml\"
+  [[joints.channels]]             # each with column, sensor, rest_resistance, front_end
+  column = \"knit1_ratio\"
+  sensor = \"knee-knit1.toml\"";

@@ -15,6 +15,7 @@ the strain is known, ``strain``, ``displacement_mm`` or ``angle_deg``. What is m
 from . import plot
 from ._core import MADE_BY, OhmstrainError
 from ._evaluation import Evaluation, Scores, evaluate
+from ._fused import FusedFilter, FusedSensor
 from ._read import read
 from ._sensor import LaggedFilter, LiveFilter, OhmstrainWarning, Prior, Sensor, calibrate
 
@@ -22,6 +23,8 @@ __version__ = MADE_BY.split()[-1]
 
 __all__ = [
     "Evaluation",
+    "FusedFilter",
+    "FusedSensor",
     "LaggedFilter",
     "LiveFilter",
     "OhmstrainError",
