@@ -129,6 +129,7 @@ fn what_is_wrong_with_several_channels_is_said() {
         (&["hand", "unfused.toml", "knee.csv"], 4, "unfused.toml: joint `knee`: expected `fusion`"),
         (&["hand", "worse.toml", "knee.csv"], 4, "worse-fusion.toml:"),
         (&["evaluate", "knee.csv", "--sensor", "knee.toml", "--check"], 2, "--check is for one sensor"),
+        (&["evaluate", "knee.csv", "--sensor", "knee.toml", "--estimator", "ekf"], 2, "--estimator is for one sensor"),
         (
             &["evaluate", "knee.toml", "--sensor", "knee.toml"],
             4,

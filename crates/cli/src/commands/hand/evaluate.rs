@@ -8,7 +8,7 @@ use ohmstrain_bench_data::Metadata;
 use super::description::Description;
 use super::joint::Joint;
 use super::scores::{self, ChannelScores, JointScores};
-use crate::args::EvaluateArgs;
+use crate::args::{Estimators, EvaluateArgs};
 use crate::channels::{Channel, Table};
 use crate::commands::scoring::Part;
 use crate::error::CliError;
@@ -39,6 +39,8 @@ pub fn run(args: &EvaluateArgs, hand: &Path) -> Result<(), CliError> {
 /// Refuses what is for one sensor.
 fn refuse_flags(args: &EvaluateArgs) -> Result<(), CliError> {
     let flags = [
+        ("--estimator", !matches!(args.estimator, Estimators::Auto)),
+        ("--without", args.without.is_some()),
         ("--report", args.report.report.is_some()),
         ("--figures", args.report.figures.is_some()),
         ("--rest-resistance", args.rest_resistance.is_some()),
