@@ -125,7 +125,7 @@ impl<'a> LeftOut<'a> {
             let known = run.block.clone().filter(|&k| run.strain[k].is_finite());
             Some(known.map(|k| run.truth(k).deviation(smoothed[k].estimate.strain)).collect())
         };
-        self.runs.par_iter().map(of_run).collect()
+        self.of_runs(of_run)
     }
 
     /// Returns a filter's predictions in `rows` of each recording, in order, of the fall of the readings; `None` if it fails. Valid only
@@ -150,6 +150,13 @@ impl<'a> LeftOut<'a> {
         Some(falls)
     }
 
+    /// Applies `of` to the runs, the longest ones first: the last one to begin ends the wait. Results are in order of the runs.
+    fn of_runs<X: Send>(&self, of: impl Fn(&Run) -> Option<X> + Sync) -> Option<Vec<X>> {
+        let mut backwards: Vec<X> = self.runs.par_iter().rev().map(&of).collect::<Option<_>>()?;
+        backwards.reverse();
+        Some(backwards)
+    }
+
     /// Applies `of` to estimate and true strain in every row of every block, block by block: the filter runs from the first row to the end
     /// of the block. Returns `None` if it fails.
     fn of_rows(&self, build: &Build, of: impl Fn(Gaussian<f64>, Truth) -> f64 + Sync) -> Option<Vec<Vec<f64>>> {
@@ -164,7 +171,7 @@ impl<'a> LeftOut<'a> {
             }
             Some(rows)
         };
-        self.runs.par_iter().map(of_run).collect()
+        self.of_runs(of_run)
     }
 }
 

@@ -17,22 +17,27 @@ use ohmstrain_sensor::{
 
 /// Pull toward the starting values, per squared step of a log-parameter: a score from one recording must not run away.
 const REGULARISATION: f64 = 1e-2;
-/// A local search: the side of the first simplex in log-parameters, the number of steps, and to how many rows the
-/// recordings are thinned for it.
+/// A local search.
 #[derive(Clone, Copy)]
 pub(crate) struct Search {
+    /// Side of the first simplex in log-parameters.
     side: f64,
+    /// Number of steps of the simplex.
     steps: u64,
+    /// Number of rows to which the recordings are thinned.
     rows: usize,
+    /// Factor on the longest step of sign-split: thinned rows are far apart, and would be divided into as many steps as all
+    /// rows.
+    step_factor: f64,
 }
 
 /// Search that measures the quality of an estimator with a law.
-pub(crate) const SURVEY: Search = Search { side: 0.7, steps: 100, rows: 500 };
+pub(crate) const SURVEY: Search = Search { side: 0.7, steps: 100, rows: 500, step_factor: 4.0 };
 
 /// Search that measures the quality with another law, starting from the result with the law before.
-const RESURVEY: Search = Search { side: 0.4, steps: 25, rows: 500 };
+const RESURVEY: Search = Search { side: 0.4, steps: 25, rows: 500, step_factor: 4.0 };
 /// Search that refines the best survey.
-pub(crate) const REFINEMENT: Search = Search { side: 0.3, steps: 45, rows: 1500 };
+pub(crate) const REFINEMENT: Search = Search { side: 0.3, steps: 45, rows: 1500, step_factor: 1.0 };
 
 impl Search {
     /// Evaluations to expect: a step of the simplex evaluates one or two points.
@@ -151,10 +156,12 @@ impl<'a> NoiseProblem<'a> {
         mut evaluated: impl FnMut(),
     ) -> Result<Tuned, CalibrationError> {
         let left_out = self.left_out(self.stride(search.rows));
+        let step_factor = if self.kind == EstimatorKind::SignSplit { search.step_factor } else { 1.0 };
         let mut cost = |point: &[f64]| {
             evaluated();
             let params = self.params(point);
-            left_out.score(&|fold| self.recipe(self.kind, fold, params)) + self.pull(point)
+            let score = left_out.score(&|fold| self.recipe(self.kind, fold, params).in_longer_steps(step_factor));
+            score + self.pull(point)
         };
         let from = from.map_or(&self.untuned, |tuned| &tuned.point);
         let point = optimise::nelder_mead(&mut cost, from, search.side, search.steps);

@@ -150,7 +150,7 @@ impl GaussianProcess {
             let own = triangle.view((start, start), (len, len)).solve_lower_triangular(&DMatrix::identity(len, len))?;
             let below = product(&triangle.view((end, start), (later, len)), &-&own);
             let below = product(&inverse.view((end, end), (later, later)), &below);
-            let precision = (own.tr_mul(&own) + below.tr_mul(&below)).cholesky()?;
+            let precision = (product(&own.transpose(), &own) + product(&below.transpose(), &below)).cholesky()?;
             inverse.view_mut((start, start), (len, len)).copy_from(&own);
             inverse.view_mut((end, start), (later, len)).copy_from(&below);
             left_out.push(BlockLeftOut { start, errors: precision.solve(&self.weights.rows(start, len)), precision });

@@ -14,6 +14,7 @@ use crate::params::law::LawParams;
 use crate::params::range::RangeParams;
 use crate::run::learned::Learned;
 use crate::run::options::Options;
+use crate::run::remembering::Remembering;
 use crate::run::running::{Reports, Running, SharedCorrection};
 use crate::run::{Filter, Smoother, Start};
 use crate::{SensorError, with_sizes};
@@ -83,6 +84,8 @@ pub struct FilterParts<'a> {
     estimator: EstimatorParams,
     parts: LiveParts<f64, ()>,
     options: Options,
+    /// Factor on the longest step between readings.
+    step_factor: f64,
 }
 
 impl<'a> FilterParts<'a> {
@@ -91,12 +94,20 @@ impl<'a> FilterParts<'a> {
         params.validate()?;
         let kind = params.filter_of(kind);
         let estimator = *params.estimator(kind)?;
-        Ok(Self { kind, law: &params.law, estimator, parts: params.live_parts(&estimator), options })
+        Ok(Self { kind, law: &params.law, estimator, parts: params.live_parts(&estimator), options, step_factor: 1.0 })
     }
 
     /// Collects the parts of a filter for a law that is being calibrated: nothing is known about the readings yet.
     pub fn of_law(kind: EstimatorKind, law: &'a LawParams, estimator: EstimatorParams, limits: RangeParams) -> Self {
-        Self { kind, law, estimator, parts: bare_parts(&estimator, limits), options: Options::plain() }
+        let parts = bare_parts(&estimator, limits);
+        Self { kind, law, estimator, parts, options: Options::plain(), step_factor: 1.0 }
+    }
+
+    /// Takes steps of up to `factor` times the longest step between readings, which is faster and less exact. None is longer than
+    /// the model's own limit, a third of the rate's correlation time.
+    #[must_use]
+    pub fn in_longer_steps(self, factor: f64) -> Self {
+        Self { step_factor: factor, ..self }
     }
 
     /// Sets other options.
@@ -140,12 +151,14 @@ impl<'a> FilterParts<'a> {
         parts: LiveParts<f64, SharedCorrection>,
         learned: Option<Arc<Learned>>,
     ) -> Result<Box<dyn Both>, SensorError> {
-        let Self { kind, law, ref estimator, options, .. } = self;
+        let Self { kind, law, ref estimator, options, step_factor, .. } = self;
         let model = switched::<B, N>(law, estimator)?;
+        let longest_step_s = parts.longest_step_s.min(model.longest_step_s());
+        let parts = LiveParts { longest_step_s, ..parts };
         let refused = SensorError::Start;
         let reports = reports(estimator, model, &parts.limits, &options);
         let limits = parts.limits;
-        let with = With { parts, reports, learned, options };
+        let with = With { parts, reports, learned, options, step_factor };
         Ok(match kind {
             EstimatorKind::Ekf => with.run::<_, L>(SparseEkf::<_, Compact, B, N>::at_a_moment(model).map_err(refused)?),
             EstimatorKind::Ukf => {
@@ -177,6 +190,7 @@ struct With<const B: usize, const N: usize> {
     reports: Reports<B, N>,
     learned: Option<Arc<Learned>>,
     options: Options,
+    step_factor: f64,
 }
 
 impl<const B: usize, const N: usize> With<B, N> {
@@ -185,6 +199,7 @@ impl<const B: usize, const N: usize> With<B, N> {
         E: SensorEstimator<f64, N, L, Prepared: Send> + Send + 'static,
         E::State: State<f64, N, L> + Serialize + DeserializeOwned + Send,
     {
+        let estimator = Remembering::new(estimator, self.step_factor);
         Box::new(Running::new(estimator, self.parts, self.reports, self.learned, &self.options))
     }
 }

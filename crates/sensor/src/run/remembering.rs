@@ -4,10 +4,12 @@ use std::collections::HashMap;
 use ohmstrain_ekf::live::SensorEstimator;
 use ohmstrain_ekf::{Advanced, Estimator, Gaussian, Innovation, Reading, StepError};
 
-/// An estimator that prepares a step once for each length. Recordings repeat a few hundred lengths, to a nanosecond: differences of
+/// An estimator that prepares a step once for each length, and may take longer steps than it asks for. Recordings repeat a few hundred lengths, to a nanosecond: differences of
 /// decimal times repeat to rounding only.
 pub(crate) struct Remembering<E, P> {
     estimator: E,
+    /// Factor on the longest step of the estimator.
+    step_factor: f64,
     prepared: RefCell<Prepared<P>>,
 }
 
@@ -22,8 +24,8 @@ struct Prepared<P> {
 const MOST_PREPARED: usize = 4096;
 
 impl<E, P> Remembering<E, P> {
-    pub(crate) fn new(estimator: E) -> Self {
-        Self { estimator, prepared: RefCell::new(Prepared { steps: HashMap::new(), last: None }) }
+    pub(crate) fn new(estimator: E, step_factor: f64) -> Self {
+        Self { estimator, step_factor, prepared: RefCell::new(Prepared { steps: HashMap::new(), last: None }) }
     }
 }
 
@@ -60,7 +62,7 @@ where
     }
 
     fn longest_step_s(&self) -> f64 {
-        self.estimator.longest_step_s()
+        self.step_factor * self.estimator.longest_step_s()
     }
 
     fn advance(

@@ -108,14 +108,14 @@ where
 {
     /// Starts before any row.
     pub(crate) fn new(
-        estimator: E,
+        estimator: Remembering<E, E::Prepared>,
         parts: LiveParts<f64, SharedCorrection>,
         reports: Reports<B, N>,
         learned: Option<Arc<Learned>>,
         options: &Options,
     ) -> Self {
         let longest_step_s = floored(estimator.longest_step_s().min(parts.longest_step_s));
-        let live = LiveFilter::new(Remembering::new(estimator), LiveParts { longest_step_s, ..parts });
+        let live = LiveFilter::new(estimator, LiveParts { longest_step_s, ..parts });
         let mut live = live.protected_by(options.protections).guarded_by(options.guard);
         if let Some(strain) = options.start.strain() {
             live.start_at(Some(strain));

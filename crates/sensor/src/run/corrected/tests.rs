@@ -15,7 +15,7 @@ use crate::params::correction::{
     CorrectionParams, CorrectionScale, CorrectorParams, FUTURE_FEATURES, InputScales, SimulatedParams, TrainingRow,
     smoother_inputs,
 };
-use crate::params::estimator::{EstimatorParams, MotionParams, NoiseParams};
+use crate::params::estimator::{EstimatorParams, MotionParams, NoiseParams, PhaseParams};
 use crate::params::law::{GaugeParams, LawParams};
 use crate::params::range::RangeParams;
 use crate::run::build::FilterParts;
@@ -312,4 +312,29 @@ fn a_lagged_row_is_mixed_with_what_was_said_of_it() {
     let expected: Vec<Gaussian<f64>> =
         said.iter().zip(&plain).map(|(said, plain)| mixture([*said, plain.estimate.strain])).collect();
     assert_eq!(out.iter().map(|output| output.estimate.strain).collect::<Vec<_>>(), expected);
+}
+
+/// Phase histories take steps of no more than a fiftieth of the shortest phase, fifteen between rows of 0.3 s. Four times as long they
+/// leave other digits, and the strain well within its interval; with a factor of 1 every bit stays.
+#[test]
+fn longer_steps_between_readings_change_little() {
+    let (law, estimator) = law_and_estimator();
+    let phases = PhaseParams { hold_time_s: 1.0, move_time_s: 10.0, reversal: 0.5, speed_per_s: 0.05, tempering: 1.0 };
+    let estimator = EstimatorParams { phases: Some(phases), ..estimator };
+    let own_steps = FilterParts::of_law(EstimatorKind::Hypotheses, &law, estimator, LIMITS);
+    let strains = |parts: FilterParts| -> Vec<Gaussian<f64>> {
+        let mut filter = parts.filter(None).unwrap();
+        let row = |k: u32| {
+            let time_s = 0.3 * f64::from(k);
+            filter.step(time_s, Some(reading(time_s))).unwrap();
+            filter.strain()
+        };
+        (0..400).map(row).collect()
+    };
+    let expected = strains(own_steps);
+    assert_eq!(strains(own_steps.in_longer_steps(1.0)), expected);
+    let longer = strains(own_steps.in_longer_steps(4.0));
+    let apart = longer.iter().zip(&expected).map(|(longer, own)| (longer.mean - own.mean).abs() / own.sd());
+    let farthest = apart.fold(0.0, f64::max);
+    assert!(farthest > 1e-6 && farthest < 0.5, "{farthest} deviations");
 }
