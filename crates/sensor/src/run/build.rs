@@ -103,8 +103,7 @@ impl<'a> FilterParts<'a> {
         Self { kind, law, estimator, parts, options: Options::plain(), step_factor: 1.0 }
     }
 
-    /// Takes steps of up to `factor` times the longest step between readings, which is faster and less exact. None is longer than
-    /// the model's own limit, a third of the rate's correlation time.
+    /// Takes steps of up to `factor` times the longest step between readings, which is faster and less exact.
     #[must_use]
     pub fn in_longer_steps(self, factor: f64) -> Self {
         Self { step_factor: factor, ..self }
@@ -153,8 +152,6 @@ impl<'a> FilterParts<'a> {
     ) -> Result<Box<dyn Both>, SensorError> {
         let Self { kind, law, ref estimator, options, step_factor, .. } = self;
         let model = switched::<B, N>(law, estimator)?;
-        let longest_step_s = parts.longest_step_s.min(model.longest_step_s());
-        let parts = LiveParts { longest_step_s, ..parts };
         let refused = SensorError::Start;
         let reports = reports(estimator, model, &parts.limits, &options);
         let limits = parts.limits;
