@@ -5,9 +5,6 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// Seed of the noise.
-pub const SEED: u64 = 1;
-
 /// Corners of the strain's path: number of steps so far, and strain as a share of the range. Rest, stretch, hold, release, hold, half-way.
 const CORNERS: [(usize, f64); 7] =
     [(0, 0.02), (20, 0.02), (100, 0.95), (150, 0.95), (230, 0.05), (260, 0.05), (300, 0.5)];
@@ -25,9 +22,9 @@ pub struct Row {
     pub extra_sd: f64,
 }
 
-/// The rows of the motion, with white noise of `reading_sd`.
-pub fn rows<const B: usize>(law: &SensorLaw<f64, B>, dt_s: f64, reading_sd: f64) -> Vec<Row> {
-    let mut random = ChaCha8Rng::seed_from_u64(SEED);
+/// The rows of the motion, with white noise of `reading_sd` from a seed.
+pub fn rows<const B: usize>(law: &SensorLaw<f64, B>, dt_s: f64, reading_sd: f64, seed: u64) -> Vec<Row> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut relaxation = [0.0; B];
     let mut rows = Vec::new();
     for corners in CORNERS.windows(2) {

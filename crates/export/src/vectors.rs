@@ -2,6 +2,9 @@
 
 use ohmstrain_ekf::live::SensorEstimator;
 use ohmstrain_ekf::{Reading, Real, StepError};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
 use serde::Serialize;
 
 use super::ExportError;
@@ -20,9 +23,8 @@ pub struct Vectors {
     /// The row before which the sensor is found to rest, and what it reads then.
     rezeroed: usize,
     rested: Literal,
-    /// Hypotheses moved on in a step, on average.
     #[serde(skip)]
-    pub work: f64,
+    pub work: Work,
 }
 
 /// One row.
@@ -41,46 +43,108 @@ pub struct Input {
     pub reading_sd: f32,
 }
 
-/// Share of the instructions of a step with a reading that a prediction takes.
-const PREDICTION: f64 = 0.75;
+/// Work of a step, on average.
+#[derive(Clone, Copy, Debug)]
+pub struct Work {
+    /// Hypotheses updated: 1 for a single Gaussian; a surprising reading counts twice.
+    pub updated: f64,
+    /// Hypotheses predicted without a reading.
+    pub predicted: f64,
+}
 
 /// Rows at the end for which the sensor rests, and what it reads then over what it read in calibration: another day.
 const RESTED: usize = 20;
 const ANOTHER_DAY: f32 = 1.08;
 
-/// Factor by which another filter may be further from exact arithmetic than Rust's `f32` filter, or than one rounding of the readings
-/// moves that.
+/// Factor by which another filter may be further from exact arithmetic than Rust's `f32` filter, or than other roundings of the
+/// readings move that.
 const FURTHER: f64 = 3.0;
 
+/// Seed of the noise, and the most that are tried.
+const FIRST_SEED: u64 = 1;
+const SEEDS: u64 = 8;
+
+/// Runs with readings rounded otherwise, and the relative deviation of that: more than C libraries differ by, so that a decision close
+/// to a tie is found.
+const ROUNDINGS: u64 = 6;
+const ROUNDED_BY: f64 = 2.0 * f32::EPSILON as f64;
+
+/// Share of the mean deviation that rounding may make: beyond it, it decides what hypotheses are merged.
+const CALM: f64 = 1e-3;
+
+/// Strain and deviation of each row, with what rounding makes of them.
+struct Run {
+    seed: u64,
+    inputs: Vec<Input>,
+    estimates: Vec<(f32, f32)>,
+    work: Work,
+    /// The largest difference that rounding makes.
+    rounding: f64,
+}
+
+impl Run {
+    /// Runs the filter in single and double precision, and again with readings rounded otherwise.
+    fn new<const B: usize, const N: usize, const L: usize>(
+        sensor: &FixedRate<'_, B, N>,
+        seed: u64,
+    ) -> Result<Self, ExportError> {
+        let inputs = readings(sensor, seed);
+        let single = |inputs: &[Input]| {
+            let motion = Motion { sensor, inputs };
+            with_twin::<_, B, N, L, _>(sensor, sensor.model, sensor.interpolated(), motion)
+        };
+        let (estimates, work): (Vec<(f32, f32)>, Work) = single(&inputs)?;
+        let (exact, _): (Vec<(f64, f64)>, Work) =
+            with_twin::<_, B, N, L, _>(sensor, sensor.reference, sensor.exact(), Motion { sensor, inputs: &inputs })?;
+        let mut rounding = farthest(&estimates, exact.into_iter());
+        // The distance from exact arithmetic may be small by chance.
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        for _ in 0..ROUNDINGS {
+            let mut rounded = |reading: f32| {
+                let normal: f64 = StandardNormal.sample(&mut random);
+                (f64::from(reading) * (1.0 + ROUNDED_BY * normal)) as f32
+            };
+            let again = inputs.iter().map(|input| Input { reading: input.reading.map(&mut rounded), ..*input });
+            let (others, _) = single(&again.collect::<Vec<_>>())?;
+            let others = others.into_iter().map(|(strain, sd)| (f64::from(strain), f64::from(sd)));
+            rounding = rounding.max(farthest(&estimates, others));
+        }
+        Ok(Self { seed, inputs, estimates, work, rounding })
+    }
+
+    /// Whether rounding makes no difference that matters.
+    fn is_calm(&self) -> bool {
+        let sd = self.estimates.iter().map(|(_, sd)| f64::from(*sd)).sum::<f64>() / self.estimates.len() as f64;
+        self.rounding < CALM * sd
+    }
+}
+
+/// The largest difference of strains, or of deviations.
+fn farthest(estimates: &[(f32, f32)], others: impl Iterator<Item = (f64, f64)>) -> f64 {
+    let off = |(&(strain, sd), other): (&(f32, f32), (f64, f64))| {
+        (f64::from(strain) - other.0).abs().max((f64::from(sd) - other.1).abs())
+    };
+    estimates.iter().zip(others).map(off).fold(0.0, f64::max)
+}
+
 impl Vectors {
-    /// Runs the filters.
+    /// Runs the filters through a motion whose noise leaves no decision to rounding; if none does, through the one that rounding changes least.
     pub fn new<const B: usize, const N: usize, const L: usize>(
         sensor: &FixedRate<'_, B, N>,
     ) -> Result<Self, ExportError> {
-        let inputs = readings(sensor);
-        let motion = || Motion { sensor, inputs: &inputs };
-        let (estimates, work): (Vec<(f32, f32)>, f64) =
-            with_twin::<_, B, N, L, _>(sensor, sensor.model, sensor.interpolated(), motion())?;
-        let (exact, _): (Vec<(f64, f64)>, f64) =
-            with_twin::<_, B, N, L, _>(sensor, sensor.reference, sensor.exact(), motion())?;
+        let mut best = Run::new::<B, N, L>(sensor, FIRST_SEED)?;
+        for seed in FIRST_SEED + 1..FIRST_SEED + SEEDS {
+            if best.is_calm() {
+                break;
+            }
+            let other = Run::new::<B, N, L>(sensor, seed)?;
+            if other.rounding < best.rounding {
+                best = other;
+            }
+        }
         let limits = sensor.narrow().limits;
         let largest = limits.lower.abs().max(limits.upper.abs());
         let ulp = largest.next_up() - largest;
-        let off = |((strain, sd), exact): (&(f32, f32), &(f64, f64))| {
-            (f64::from(*strain) - exact.0).abs().max((f64::from(*sd) - exact.1).abs())
-        };
-        let mut rounding = estimates.iter().zip(&exact).map(off).fold(0.0, f64::max);
-        // The distance from exact arithmetic may be small by chance: readings of one rounding more or less say so.
-        for nudged in [f32::next_up, f32::next_down] {
-            let nudge = |input: &Input| Input { reading: input.reading.map(nudged), ..*input };
-            let inputs: Vec<Input> = inputs.iter().map(nudge).collect();
-            let motion = Motion { sensor, inputs: &inputs };
-            let (others, _) = with_twin::<_, B, N, L, _>(sensor, sensor.model, sensor.interpolated(), motion)?;
-            let exactly = |(strain, sd): (f32, f32)| (f64::from(strain), f64::from(sd));
-            let others = others.into_iter().map(exactly).collect::<Vec<_>>();
-            rounding = estimates.iter().zip(&others).map(off).fold(rounding, f64::max);
-        }
-        let tolerance = ((FURTHER + 1.0) * rounding / f64::from(ulp)).ceil() as u64;
         let row = |(input, estimate): (&Input, &(f32, f32))| Vector {
             reading: input.reading.map(Literal),
             reading_sd: Literal(input.reading_sd),
@@ -88,28 +152,28 @@ impl Vectors {
             strain_sd: Literal(estimate.1),
         };
         Ok(Self {
-            seed: motion::SEED,
-            rezeroed: inputs.len() - RESTED,
+            seed: best.seed,
+            rezeroed: best.inputs.len() - RESTED,
             rested: Literal(rested_elsewhere(sensor)),
             ulp: Literal(ulp),
-            tolerance_ulp: tolerance,
-            work,
-            rows: inputs.iter().zip(&estimates).map(row).collect(),
+            tolerance_ulp: ((FURTHER + 1.0) * best.rounding / f64::from(ulp)).ceil() as u64,
+            work: best.work,
+            rows: best.inputs.iter().zip(&best.estimates).map(row).collect(),
         })
     }
 }
 
-/// Hypotheses moved on in a step of the motion, on average, each time that they are.
-pub fn work<const B: usize, const N: usize, const L: usize>(sensor: &FixedRate<'_, B, N>) -> Result<f64, ExportError> {
-    let inputs = readings(sensor);
+/// Work of a step of the motion.
+pub fn work<const B: usize, const N: usize, const L: usize>(sensor: &FixedRate<'_, B, N>) -> Result<Work, ExportError> {
+    let inputs = readings(sensor, FIRST_SEED);
     let motion = Motion { sensor, inputs: &inputs };
-    let (_, work): (Vec<(f32, f32)>, f64) =
+    let (_, work): (Vec<(f32, f32)>, Work) =
         with_twin::<_, B, N, L, _>(sensor, sensor.model, sensor.interpolated(), motion)?;
     Ok(work)
 }
 
 /// The readings of the motion, in the sensor's unit.
-fn readings<const B: usize, const N: usize>(sensor: &FixedRate<'_, B, N>) -> Vec<Input> {
+fn readings<const B: usize, const N: usize>(sensor: &FixedRate<'_, B, N>, seed: u64) -> Vec<Input> {
     let rest = sensor.parts.live.rest_reading;
     let input = |row: motion::Row| Input {
         reading: row.rho.map(|rho| (rest * (1.0 + rho)) as f32),
@@ -118,7 +182,7 @@ fn readings<const B: usize, const N: usize>(sensor: &FixedRate<'_, B, N>) -> Vec
     let reading_sd = f64::from(sensor.model.noise().reading_sd);
     let dt_s = sensor.parts.live.dt_s;
     let mut inputs: Vec<Input> =
-        motion::rows(sensor.reference.law(), dt_s, reading_sd).into_iter().map(input).collect();
+        motion::rows(sensor.reference.law(), dt_s, reading_sd, seed).into_iter().map(input).collect();
     // It wanders, so that no number comes twice.
     let wandering = |row: usize| 1.0 + reading_sd * (row as f64).sin();
     let rested = f64::from(rested_elsewhere(sensor));
@@ -138,14 +202,14 @@ fn relative<T: Real>(rest_reading: f32, input: &Input) -> Option<Reading<T>> {
     input.reading.map(|reading| Reading { value: value(reading), extra_variance: exactly(sd * sd) })
 }
 
-/// Strain and deviation as they are reported, row by row; hypotheses moved on in a step.
+/// Strain and deviation as they are reported, row by row; the work of a step.
 struct Motion<'a, const B: usize, const N: usize> {
     sensor: &'a FixedRate<'a, B, N>,
     inputs: &'a [Input],
 }
 
 impl<T: Real, const B: usize, const S: usize> Task<T> for Motion<'_, B, S> {
-    type Said = (Vec<(T, T)>, f64);
+    type Said = (Vec<(T, T)>, Work);
 
     fn run<F, const N: usize, const L: usize>(
         self,
@@ -168,6 +232,6 @@ impl<T: Real, const B: usize, const S: usize> Task<T> for Motion<'_, B, S> {
             estimates.push((strain.mean, strain.sd()));
         }
         let [updated, predicted] = live.estimator().work().map(|count| count as f64 / inputs.len() as f64);
-        Ok((estimates, updated + PREDICTION * predicted))
+        Ok((estimates, Work { updated, predicted }))
     }
 }
