@@ -112,7 +112,7 @@ impl Run {
         Ok(Self { seed, inputs, estimates, work, rounding })
     }
 
-    /// Whether rounding makes no difference that matters.
+    /// True if rounding makes no difference that matters.
     fn is_calm(&self) -> bool {
         let sd = self.estimates.iter().map(|(_, sd)| f64::from(*sd)).sum::<f64>() / self.estimates.len() as f64;
         self.rounding < CALM * sd
