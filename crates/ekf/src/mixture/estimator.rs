@@ -153,17 +153,27 @@ macro_rules! mixture_steps {
             }
         }
 
-        /// Steps once, never inlined: a program has it once, for the first try and for all others.
-        #[inline(never)]
+        #[inline(always)]
         fn step_once<const L: usize>(
             &self,
             state: &mut Mixture<T, N, L, K>,
             heard: impl Hearing<T>,
         ) -> Result<Option<MixtureResidual<T>>, StepError> {
             let mut next = Mixture::empty();
-            let residual = self.step_recorded(state, heard.reading(), &mut next, &mut ())?;
+            let residual = self.step_to(state, heard, &mut next)?;
             *state = next;
             Ok(residual)
+        }
+
+        /// Steps once, never inlined: a program has it once, for the first try and for all others.
+        #[inline(never)]
+        fn step_to<const L: usize>(
+            &self,
+            state: &Mixture<T, N, L, K>,
+            heard: impl Hearing<T>,
+            next: &mut Mixture<T, N, L, K>,
+        ) -> Result<Option<MixtureResidual<T>>, StepError> {
+            self.step_recorded(state, heard.reading(), next, &mut ())
         }
 
         #[cold]
@@ -200,10 +210,10 @@ macro_rules! mixture_steps {
             reading: Option<Reading<T>>,
             next: &mut Mixture<T, N, L, K>,
         ) -> Result<Option<MixtureResidual<T>>, StepError> {
-            match self.step_recorded(state, reading, next, &mut ()) {
-                Err(_) => {
+            match self.step_to(state, reading, next) {
+                Err(refused) => {
                     *next = *state;
-                    self.step_hearing(next, reading)
+                    self.step_again(next, reading, refused)
                 }
                 taken => taken,
             }
