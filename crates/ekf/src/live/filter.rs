@@ -59,6 +59,17 @@ pub struct LiveRow<T, S> {
     pub pause: Pause<T>,
 }
 
+impl<T, S> LiveRow<T, S> {
+    /// Converts the state.
+    ///
+    /// # Errors
+    /// That of the conversion.
+    pub fn try_map<R, E>(self, convert: impl FnOnce(S) -> Result<R, E>) -> Result<LiveRow<T, R>, E> {
+        let Self { estimate, stated, doubts, heard, look, pause } = self;
+        Ok(LiveRow { estimate, stated, doubts, heard, look: look.map(convert).transpose()?, pause })
+    }
+}
+
 /// A reading and its use.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -129,6 +140,18 @@ pub struct Memory<T, S> {
     doubts: Doubts<T>,
     /// Follower of R₀; `None` if R₀ is given, or does not follow.
     follower: Option<RestFollower<T>>,
+}
+
+impl<T, S> Memory<T, S> {
+    /// Converts the state.
+    ///
+    /// # Errors
+    /// That of the conversion.
+    pub fn try_map<R, E>(self, convert: impl FnOnce(S) -> Result<R, E>) -> Result<Memory<T, R>, E> {
+        let Self { state, pause, streak, repeats, jumps, watched, known_variance, doubts, follower } = self;
+        let state = convert(state)?;
+        Ok(Memory { state, pause, streak, repeats, jumps, watched, known_variance, doubts, follower })
+    }
 }
 
 impl<T, E, C, const N: usize, const L: usize> LiveFilter<T, E, C, N, L>

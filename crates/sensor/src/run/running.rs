@@ -7,14 +7,14 @@ use ohmstrain_ekf::live::{Correct, Doubts, Flags, Heard, LiveFilter, LiveParts, 
 use ohmstrain_ekf::{Estimate, Estimator, Gaussian, PastStep, Reading, Settling, State, StepError};
 use ohmstrain_model::{StrainRange, SwitchedModel};
 use serde::Serialize;
-use serde::de::{DeserializeOwned, Error as _};
+use serde::de::DeserializeOwned;
 
 use crate::run::backward::{Backward, Row};
 use crate::run::clock::{Clock, floored};
 use crate::run::learned::{Learned, OfFilter};
 use crate::run::options::Options;
 use crate::run::remembering::Remembering;
-use crate::run::stored::{Stored, Waiting, all_pending};
+use crate::run::stored::{Stored, Waiting};
 use crate::run::{Filter, Output};
 
 /// The live filter on a computer.
@@ -124,7 +124,8 @@ where
         Self { live, clock: Clock::default(), reports, learned, last: None, pending, due }
     }
 
-    /// The next row.
+    /// The next row. Never inlined: a program has it once for each estimator and size.
+    #[inline(never)]
     pub(crate) fn row(
         &mut self,
         time_s: f64,
@@ -288,18 +289,21 @@ where
     }
 
     fn store(&self) -> Result<toml::Table, toml::ser::Error> {
+        let last = self.last.as_ref().map(|row| row.clone().try_map(toml::Value::try_from));
         toml::Table::try_from(Stored {
             clock: self.clock,
-            memory: self.live.memory(),
-            last: self.last.clone(),
-            waiting: self.pending.iter().map(Waiting::of).collect(),
+            memory: self.live.memory().try_map(toml::Value::try_from)?,
+            last: last.transpose()?,
+            waiting: self.pending.iter().map(Waiting::of).collect::<Result<_, _>>()?,
         })
     }
 
     fn resume(&mut self, stored: toml::Table) -> Result<(), toml::de::Error> {
-        let Stored { clock, memory, last, waiting } = stored.try_into::<Stored<E::State>>()?;
-        let neither = || toml::de::Error::custom("`waiting`: expected rows with `read` or `predicted`");
-        self.pending = all_pending(waiting, self.live.substeps()).ok_or_else(neither)?;
+        let Stored { clock, memory, last, waiting } = stored.try_into()?;
+        let memory = memory.try_map(toml::Value::try_into)?;
+        let last = last.map(|row| row.try_map(toml::Value::try_into)).transpose()?;
+        let waiting = waiting.into_iter().map(|row| row.pending(self.live.substeps()));
+        self.pending = waiting.collect::<Result<_, _>>()?;
         self.live.return_to(&memory);
         (self.clock, self.last) = (clock, last);
         Ok(())
