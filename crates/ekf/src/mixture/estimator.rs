@@ -148,48 +148,50 @@ macro_rules! mixture_steps {
             heard: impl Hearing<T>,
         ) -> Result<Option<MixtureResidual<T>>, StepError> {
             match self.step_once(state, heard) {
-                Err(refused) => self.step_again(state, heard, refused),
+                Err(refused) => self.step_again(state, heard, refused, |state, heard| self.step_once(state, heard)),
                 taken => taken,
             }
         }
 
-        #[inline(always)]
+        /// Steps once, never inlined: a program that steps in place has it once, for the first try and for all others.
+        #[inline(never)]
         fn step_once<const L: usize>(
             &self,
             state: &mut Mixture<T, N, L, K>,
             heard: impl Hearing<T>,
         ) -> Result<Option<MixtureResidual<T>>, StepError> {
             let mut next = Mixture::empty();
-            let residual = self.step_to(state, heard, &mut next)?;
+            let residual = self.step_recorded(state, heard.reading(), &mut next, &mut ())?;
             *state = next;
             Ok(residual)
         }
 
-        /// Steps once, never inlined: a program has it once, for the first try and for all others.
+        /// The same for a program that steps into another state.
         #[inline(never)]
         fn step_to<const L: usize>(
             &self,
             state: &Mixture<T, N, L, K>,
-            heard: impl Hearing<T>,
+            reading: Option<Reading<T>>,
             next: &mut Mixture<T, N, L, K>,
         ) -> Result<Option<MixtureResidual<T>>, StepError> {
-            self.step_recorded(state, heard.reading(), next, &mut ())
+            self.step_recorded(state, reading, next, &mut ())
         }
 
         #[cold]
         #[inline(never)]
-        fn step_again<const L: usize>(
+        fn step_again<const L: usize, H: Hearing<T>>(
             &self,
             state: &mut Mixture<T, N, L, K>,
-            mut heard: impl Hearing<T>,
+            mut heard: H,
             mut refused: StepError,
+            once: impl Fn(&mut Mixture<T, N, L, K>, H) -> Result<Option<MixtureResidual<T>>, StepError>,
         ) -> Result<Option<MixtureResidual<T>>, StepError> {
             let (mut from, mut tries) = (*state, 0);
             loop {
                 tries += 1;
                 heard = heard.again(&self.kernel, tries, refused)?;
                 loosen(from.shares_mut(), tries);
-                match self.step_once(&mut from, heard) {
+                match once(&mut from, heard) {
                     Err(error) => refused = error,
                     taken => {
                         *state = from;
@@ -213,7 +215,12 @@ macro_rules! mixture_steps {
             match self.step_to(state, reading, next) {
                 Err(refused) => {
                     *next = *state;
-                    self.step_again(next, reading, refused)
+                    self.step_again(next, reading, refused, |state, reading| {
+                        let mut next = Mixture::empty();
+                        let residual = self.step_to(state, reading, &mut next)?;
+                        *state = next;
+                        Ok(residual)
+                    })
                 }
                 taken => taken,
             }
