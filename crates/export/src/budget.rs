@@ -184,13 +184,13 @@ pub fn candidates(params: &SensorParams, budget: &Budget, dt_s: f64) -> Result<V
     }
 }
 
-/// Plans that fit, the best by the table first.
+/// Returns the first of [`candidates`] that fits.
 ///
 /// # Errors
 /// If the sensor has no exported form, or nothing fits.
-pub fn fitting(params: &SensorParams, budget: &Budget, dt_s: f64) -> Result<Vec<Plan>, ExportError> {
-    let candidates = candidates(params, budget, dt_s)?.into_iter();
-    Ok(candidates.filter(|candidate| candidate.lacks.is_none()).map(|candidate| candidate.plan).collect())
+pub fn first_fitting(params: &SensorParams, budget: &Budget, dt_s: f64) -> Result<Plan, ExportError> {
+    let fits = candidates(params, budget, dt_s)?.into_iter().find(|candidate| candidate.lacks.is_none());
+    Ok(fits.map_or_else(Plan::default, |candidate| candidate.plan))
 }
 
 /// Plans of a sensor's default, the best first.

@@ -8,6 +8,7 @@ mod budget;
 mod constants;
 mod correction;
 mod cost;
+mod firmware;
 mod fixed_rate;
 mod law;
 mod literal;
@@ -15,6 +16,7 @@ mod motion;
 mod pace;
 mod plan;
 mod prefix;
+mod promise;
 mod quadratic;
 mod reduced;
 mod replay;
@@ -22,19 +24,23 @@ mod steps;
 mod twin;
 mod vectors;
 
+use std::str::FromStr;
+
 use minijinja::Environment;
 use minijinja::syntax::SyntaxConfig;
 use minijinja::value::Serde;
 use ohmstrain_sensor::{EstimatorKind, SensorParams};
 
 pub use boards::{BOARDS, Board};
-pub use budget::{Budget, Candidate, Room, candidates, fitting};
+pub use budget::{Budget, Candidate, Room, candidates, first_fitting};
 use constants::Exported;
 pub use cost::{Cost, Processor, cost};
+pub use firmware::Firmware;
 use ohmstrain::MADE_BY;
 pub use pace::usual_step_s;
 pub use plan::{ChipFilter, Plan};
 pub use prefix::Prefix;
+pub use promise::{Compared, Promise};
 pub use replay::{ReplayedRow, Said, replay};
 
 /// A language that sensors are exported to.
@@ -46,7 +52,20 @@ pub enum ExportTarget {
     Rust,
 }
 
+impl FromStr for ExportTarget {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        match name {
+            "c" => Ok(Self::C),
+            "rust" => Ok(Self::Rust),
+            other => Err(format!("expected c or rust, found `{other}`")),
+        }
+    }
+}
+
 /// A file to write.
+#[derive(Clone, Debug)]
 pub struct SourceFile {
     /// Path in the folder.
     pub path: String,

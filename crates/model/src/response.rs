@@ -96,18 +96,21 @@ impl<T: Scalar, const B: usize> Response<T, B> {
             branch_noise: [[T::zero(); B]; B],
         };
         for j in 0..M {
-            let (on_motion, on_branches) = Series::from_unit(j, motion, branches).change_at(h);
+            let series = Series::from_unit(j, motion, branches);
+            let (on_motion, on_branches) = series.change_at(h);
             for i in 0..M {
                 out.motion_change[i][j] = on_motion[i];
             }
             for i in 0..B {
                 out.drive[i][j] = on_branches[i];
             }
-        }
-        let impulse = Series::from_unit(M - 1, motion, branches);
-        (out.input, out.drive_input) = impulse.integral(h);
-        for (node, weight) in nodes() {
-            out.add_noise(&impulse.at(h * node), motion.noise_density() * h * weight);
+            // A push and the noise act on the last motion state.
+            if j == M - 1 {
+                (out.input, out.drive_input) = series.integral(h);
+                for (node, weight) in nodes() {
+                    out.add_noise(&series.at(h * node), motion.noise_density() * h * weight);
+                }
+            }
         }
         out
     }
@@ -218,8 +221,12 @@ impl<T: Scalar, const B: usize> Series<T, B> {
     fn change_at(&self, s: T) -> ([T; M], [T; B]) {
         let mut out = ([T::zero(); M], [T::zero(); B]);
         for n in (1..TERMS).rev() {
-            out.0 = core::array::from_fn(|i| (out.0[i] + self.motion[n][i]) * s);
-            out.1 = core::array::from_fn(|i| (out.1[i] + self.branches[n][i]) * s);
+            for i in 0..M {
+                out.0[i] = (out.0[i] + self.motion[n][i]) * s;
+            }
+            for i in 0..B {
+                out.1[i] = (out.1[i] + self.branches[n][i]) * s;
+            }
         }
         out
     }
@@ -229,8 +236,12 @@ impl<T: Scalar, const B: usize> Series<T, B> {
         let mut out = ([T::zero(); M], [T::zero(); B]);
         let mut order = T::of(TERMS as f64);
         for n in (0..TERMS).rev() {
-            out.0 = core::array::from_fn(|i| out.0[i] * h + self.motion[n][i] / order);
-            out.1 = core::array::from_fn(|i| out.1[i] * h + self.branches[n][i] / order);
+            for i in 0..M {
+                out.0[i] = out.0[i] * h + self.motion[n][i] / order;
+            }
+            for i in 0..B {
+                out.1[i] = out.1[i] * h + self.branches[n][i] / order;
+            }
             order -= T::one();
         }
         (out.0.map(|x| x * h), out.1.map(|x| x * h))

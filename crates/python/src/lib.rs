@@ -8,6 +8,7 @@ mod calibration;
 mod doubts;
 mod error;
 mod evaluation;
+mod firmware;
 mod fused;
 mod live;
 mod options;

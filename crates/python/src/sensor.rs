@@ -8,6 +8,7 @@ use crate::about::About;
 use crate::doubts::of_known;
 use crate::error::{Place, of_library, raise};
 use crate::evaluation::{self, Scored};
+use crate::firmware::{self, Exported};
 use crate::live::{LaggedFilter, LiveFilter, stored};
 use crate::options::Options;
 use crate::recording::Recording;
@@ -165,5 +166,17 @@ impl Sensor {
         let recording = Recording::new(table, about)?;
         let sensor = self.for_recording(&recording, &options)?;
         evaluation::with_sensor(py, &recording, &sensor, &options, from_s)
+    }
+
+    /// Returns the filter as source code for a microcontroller.
+    fn export(
+        &self,
+        py: Python,
+        target: &str,
+        dt_s: Option<f64>,
+        budget: Option<&str>,
+        prefix: &str,
+    ) -> PyResult<Exported> {
+        py.detach(|| firmware::exported(self.sensor.params(), target, dt_s, budget, prefix))
     }
 }

@@ -65,6 +65,31 @@ def test_calibrate(folder, trace):
     assert made.findings == json.loads(printed)["left_out"]
 
 
+@pytest.mark.parametrize(
+    ("flags", "options"),
+    [(("--target", "c"), {}), (("--target", "rust", "--dt-s", "0.1"), {"target": "rust", "dt_s": 0.1}), (("--target", "c", "--budget", "board=nano33ble"), {"budget": "board=nano33ble"})],
+)
+def test_export(folder, sensor, tmp_path, flags, options):
+    printed = run(folder, "export", "--sensor", "sensor.toml", "-o", str(tmp_path / "theirs"), *flags)
+    promise = sensor.export(tmp_path / "ours", **options)
+    assert printed.splitlines()[-1].startswith(promise.splitlines()[-1])
+    assert "\n".join(promise.splitlines()[:-1]) in printed
+    theirs, ours = ({path.relative_to(of): path.read_bytes() for path in of.rglob("*.*")} for of in (tmp_path / "theirs", tmp_path / "ours"))
+    assert theirs == ours
+
+
+def test_export_refuses(sensor, tmp_path):
+    for wrong, text in (
+        ({"target": "ada"}, "target: expected c or rust, found `ada`"),
+        ({"dt_s": -1.0}, "dt_s: expected a positive number, found -1"),
+        ({"budget": "flash=10"}, "budget: nothing fits"),
+        ({"prefix": "9"}, "prefix: "),
+    ):
+        with pytest.raises(oh.OhmstrainError, match=text):
+            sensor.export(tmp_path / "none", **wrong)
+    assert not (tmp_path / "none").exists()
+
+
 def test_evaluate(folder, trace, sensor):
     printed = json.loads(run(folder, "evaluate", "trace.csv", "--sensor", "sensor.toml", "--from", "300", "--json"))
     compare(sensor.evaluate(trace, from_s=300.0), printed["recordings"][0])

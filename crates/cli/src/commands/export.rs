@@ -2,12 +2,12 @@ use ohmstrain_bench_data::Metadata;
 
 use crate::args::ExportArgs;
 use crate::commands::export_choice::{self, Choice};
-use crate::commands::export_score::{OnRecording, Promise};
+use crate::commands::export_score::{OnRecording, print_promise};
 use crate::error::CliError;
 use crate::input;
 use crate::output::{Kind, Outputs};
 use crate::sensor_file;
-use ohmstrain_export::{self as export, ExportError};
+use ohmstrain_export::{self as export, Compared, ExportError, Promise};
 
 /// Writes a sensor's filter as source code.
 pub fn run(args: &ExportArgs) -> Result<(), CliError> {
@@ -28,7 +28,10 @@ pub fn run(args: &ExportArgs) -> Result<(), CliError> {
     };
     let Choice { plan, lines } = export_choice::choose(args, params, dt_s, recording.as_ref())?;
     let refused = |error: ExportError| CliError::export(&error, &args.sensor.display().to_string());
-    let promise = Promise::new(args, dt_s, params, &plan, recording.as_ref())?;
+    let compared = recording.as_ref().map(|recording| recording.compared(params, &plan, args)).transpose()?;
+    let promise = Promise::new(params, &plan, dt_s, compared.as_ref(), args.budget.as_ref()).map_err(refused)?;
+    let worse = |compared: &&Compared| compared.exported.rmse > compared.static_cubic.rmse;
+    let worse_on = compared.as_ref().filter(worse).and(recording.as_ref()).map(OnRecording::name);
     let files =
         export::files(params, &plan, args.target.into(), dt_s, &args.prefix, &promise.lines).map_err(refused)?;
     let mut outputs = Outputs::new(args.force, std::iter::once(&args.sensor).chain(&args.score));
@@ -41,6 +44,6 @@ pub fn run(args: &ExportArgs) -> Result<(), CliError> {
         outputs.put(output, file.content);
     }
     // After the places are known to be there, before anything is written to them: it may refuse.
-    promise.print(args, &lines)?;
+    print_promise(args, &lines, &promise, worse_on)?;
     outputs.publish()
 }

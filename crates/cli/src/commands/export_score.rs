@@ -5,11 +5,10 @@ use ohmstrain_calib::{Baseline, ScoredRow};
 use ohmstrain_sensor::{Scores, SensorParams};
 
 use crate::args::ExportArgs;
-use crate::commands::score_table::covered;
 use crate::error::CliError;
 use crate::input::TraceFile;
-use crate::output::{self, print};
-use ohmstrain_export::{self as export, ChipFilter, Cost, ExportTarget, Plan, ReplayedRow};
+use crate::output::print;
+use ohmstrain_export::{self as export, Compared, ExportTarget, Plan, Promise, ReplayedRow};
 
 /// A recording with a reference, and what this computer and a static cubic make of it, as they would live.
 pub struct OnRecording {
@@ -67,101 +66,48 @@ impl OnRecording {
         self.scores(&self.program.iter().zip(&replayed).map(of).collect::<Vec<_>>())
     }
 
+    /// Compares the exported code with the filter on this computer and with a static cubic.
+    pub fn compared(&self, params: &SensorParams, plan: &Plan, args: &ExportArgs) -> Result<Compared, CliError> {
+        Ok(Compared {
+            exported: self.exported(params, plan, args)?,
+            computer: self.scores(&self.program)?,
+            static_cubic: self.scores(&self.static_cubic)?,
+        })
+    }
+
+    /// Name of its file.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
     /// Its error, percent of full scale.
     pub fn error(&self, params: &SensorParams, plan: &Plan, args: &ExportArgs) -> Result<f64, CliError> {
         Ok(self.exported(params, plan, args)?.rmse_percent_fs)
     }
 }
 
-/// Promise of an exported filter: its errors and its costs.
-pub struct Promise {
-    /// A table of errors and costs, for the header of the exported code, too.
-    pub lines: Vec<String>,
-    words: String,
-    /// The recording on which it is worse than a static cubic.
-    worse_on: Option<String>,
-}
-
-impl Promise {
-    /// Creates the promise of a plan; it has scores if there is a recording.
-    pub fn new(
-        args: &ExportArgs,
-        dt_s: f64,
-        params: &SensorParams,
-        plan: &Plan,
-        recording: Option<&OnRecording>,
-    ) -> Result<Self, CliError> {
-        let name = args.sensor.display().to_string();
-        let chip = ChipFilter::new(params, plan).map_err(|error| CliError::export(&error, &name))?;
-        let cost = export::cost(params, plan, dt_s).map_err(|error| CliError::export(&error, &name))?;
-        let mut table =
-            output::table(["estimate", "%FS", "50/90/95 %", "instructions", "flash, B", "RAM, B", "of it stack, B"]);
-        let mut worse_on = None;
-        let of = |error: f64, coverage: String| vec![format!("{error:.2}"), coverage];
-        let of_95 = |percent: f64| format!("-/-/{percent:.0}");
-        let of_all = |scores: &Scores| {
-            of(scores.rmse_percent_fs, covered([scores.coverage_50, scores.coverage_90, scores.coverage_95]))
+/// Prints the candidates and the promise; refuses what is worse than a static cubic on `recording`, unless it is forced.
+pub fn print_promise(
+    args: &ExportArgs,
+    candidates: &[String],
+    promise: &Promise,
+    worse_on: Option<&str>,
+) -> Result<(), CliError> {
+    print(|out| {
+        for line in candidates.iter().chain(&promise.lines) {
+            writeln!(out, "{line}")?;
+        }
+        // Rust was counted once, by scripts/exported-c.sh, for docs/chip.md.
+        let of = match args.target.into() {
+            ExportTarget::C => "",
+            ExportTarget::Rust => " of the same in C",
         };
-        let mut add = |name: &str, cells: Vec<String>| {
-            table.add_row(std::iter::once(name.to_owned()).chain(cells));
-        };
-        let is_default = plan.kind.is_none_or(|kind| kind == params.default_estimator) && !chip.is_smaller();
-        let whose = if is_default { "" } else { " of the default" };
-        if let Some(summary) = &params.summary {
-            let promised = of(summary.left_out_percent_fs, of_95(summary.coverage_95_percent));
-            add(&format!("promised{whose}: left out"), promised);
-            add("static cubic: left out", of(summary.static_cubic_percent_fs, String::new()));
-        }
-        if let Some(tested) = &params.tested {
-            add(
-                &format!("tested{whose}: rows kept from calibration"),
-                of(tested.filter_percent_fs, of_95(tested.coverage_95_percent)),
-            );
-            add("static cubic: these rows", of(tested.static_cubic_percent_fs, String::new()));
-        }
-        let mut exported = vec![String::new(); 2];
-        if let Some(recording) = recording {
-            let scores = recording.exported(params, plan, args)?;
-            let (program, cubic) = (recording.scores(&recording.program)?, recording.scores(&recording.static_cubic)?);
-            add("static cubic", of_all(&cubic));
-            add("this computer", of_all(&program));
-            exported = of_all(&scores);
-            worse_on = (scores.rmse > cubic.rmse).then(|| recording.name.clone());
-        }
-        let of_cost =
-            |cost: &Cost| [cost.instructions, cost.flash, cost.ram(), cost.stack].map(|number| number.to_string());
-        exported.extend(of_cost(&cost));
-        add("exported", exported);
-        if let Some((budget, board)) = args.budget.as_ref().and_then(|budget| Some((budget, budget.board()?))) {
-            let nothing = || vec![String::new(); 2];
-            let cost = budget.cost(params, plan, dt_s).map_err(|error| CliError::export(&error, &name))?;
-            add(&format!("on {}", board.title), [nothing(), of_cost(&cost).to_vec()].concat());
-            let room = budget.room(dt_s);
-            let most = [room.instructions, room.flash, room.ram].map(|number| number.to_string());
-            add("room for it there", [nothing(), most.to_vec()].concat());
-        }
-        let words = format!("{}; a reading every {dt_s} s", chip.words());
-        Ok(Self { lines: table.lines().collect(), words, worse_on })
-    }
-
-    /// Prints the candidates, and it; refuses what is worse than a static cubic, unless it is forced.
-    pub fn print(&self, args: &ExportArgs, candidates: &[String]) -> Result<(), CliError> {
-        print(|out| {
-            for line in candidates.iter().chain(&self.lines) {
-                writeln!(out, "{line}")?;
-            }
-            // Rust was counted once, by scripts/exported-c.sh, for docs/chip.md.
-            let of = match args.target.into() {
-                ExportTarget::C => "",
-                ExportTarget::Rust => " of the same in C",
-            };
-            Ok(writeln!(out, "{}; instructions a step of a Cortex-M4F{of}, estimated as is the rest", self.words)?)
-        })?;
-        match &self.worse_on {
-            Some(name) if !args.force => Err(CliError::Input(format!(
-                "{name}: what would be exported is worse than a static cubic here; --force exports it"
-            ))),
-            _ => Ok(()),
-        }
+        Ok(writeln!(out, "{}; instructions a step of a Cortex-M4F{of}, estimated as is the rest", promise.words)?)
+    })?;
+    match worse_on {
+        Some(name) if !args.force => Err(CliError::Input(format!(
+            "{name}: what would be exported is worse than a static cubic here; --force exports it"
+        ))),
+        _ => Ok(()),
     }
 }

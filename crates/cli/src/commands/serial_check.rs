@@ -33,10 +33,7 @@ pub fn run(args: &SerialCheckArgs) -> Result<(), CliError> {
     let dt_s = export_choice::usual_step_s(args.dt_s, params)?;
     let plan = match &args.budget {
         None => Plan { kind: asked, ..Plan::default() },
-        Some(budget) => {
-            let fitting = export::fitting(params, budget, dt_s).map_err(|error| CliError::export(&error, &name))?;
-            fitting.into_iter().next().unwrap_or_default()
-        }
+        Some(budget) => export::first_fitting(params, budget, dt_s).map_err(|error| CliError::export(&error, &name))?,
     };
     let heard = listen(args)?;
     let said = replayed(params, &plan, dt_s, &heard.steps).map_err(|error| CliError::export(&error, &name))?;

@@ -33,6 +33,9 @@ class Sensor:
     def evaluate(
         self, table: Any, about: dict[str, Any], options: dict[str, Any], from_s: float
     ) -> list[tuple[str, str]]: ...
+    def export(
+        self, target: str, dt_s: float | None, budget: str | None, prefix: str
+    ) -> tuple[list[tuple[str, str]], list[str], str]: ...
 
 class LiveFilter:
     def step(self, time_s: float, reading: float | None = None) -> dict[str, Any]: ...

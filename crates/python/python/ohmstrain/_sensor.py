@@ -270,6 +270,45 @@ class Sensor:
         scored = self._core.evaluate(_tables.to_arrow(recording), about, _options(**options), from_s)
         return Evaluation(scored, about["name"], None)
 
+    def export(
+        self,
+        folder: str | os.PathLike[str],
+        *,
+        target: str = "c",
+        dt_s: float | None = None,
+        budget: str | None = None,
+        prefix: str = "ohmstrain",
+    ) -> str:
+        """Write the filter as source code for a microcontroller into a folder, as ``ohmstrain export`` does.
+
+        Parameters
+        ----------
+        target
+            ``c``: C99 in the layout of an Arduino library, with a self-test; or ``rust``: constants for the crate ``ohmstrain-ekf``.
+        dt_s
+            Usual time between two readings, s; by default that of the calibration's recordings.
+        budget
+            Largest cost, as ``--budget`` takes it: ``lean``, or some of ``board=NAME,instructions=N,flash=BYTES,ram=BYTES``; the first
+            of its candidates that fits is exported. Without it all of the filter is.
+        prefix
+            What the names of the C code begin with.
+
+        Returns
+        -------
+        What was promised of the filter, and what it costs on a Cortex-M4F: a table.
+
+        Raises
+        ------
+        OhmstrainError
+            If the filter has no form for a microcontroller, or nothing fits. Then nothing is written.
+        """
+        files, promise, words = self._core.export(target, dt_s, budget, prefix)
+        for path, content in files:
+            place = Path(folder, path)
+            place.parent.mkdir(parents=True, exist_ok=True)
+            _write(place, content)
+        return "\n".join([*promise, words])
+
     def _estimate(self, method: Any, recording: Any, options: dict[str, Any]) -> Any:
         about, options = _split(options)
         table, doubts = method(_tables.to_arrow(recording), about, _options(**options))

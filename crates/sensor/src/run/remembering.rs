@@ -4,8 +4,8 @@ use std::collections::HashMap;
 use ohmstrain_ekf::live::SensorEstimator;
 use ohmstrain_ekf::{Advanced, Estimator, Gaussian, Innovation, Reading, StepError};
 
-/// An estimator that prepares a step once for each length, and may take longer steps than it asks for. Recordings repeat a few hundred lengths, to a nanosecond: differences of
-/// decimal times repeat to rounding only.
+/// An estimator that prepares a step once for each length, and may take longer steps than it asks for. Recordings repeat a few
+/// hundred lengths, to a nanosecond: differences of decimal times repeat to rounding only.
 pub(crate) struct Remembering<E, P> {
     estimator: E,
     /// Factor on the longest step of the estimator.
@@ -13,36 +13,50 @@ pub(crate) struct Remembering<E, P> {
     prepared: RefCell<Prepared<P>>,
 }
 
-/// Prepared steps by the bits of their length.
+/// Prepared steps.
 struct Prepared<P> {
-    steps: HashMap<u64, P>,
-    /// The step used last: at a fixed rate it is the next one, too.
-    last: Option<(u64, P)>,
+    steps: Vec<P>,
+    /// The place of a step, by the bits of its length.
+    places: HashMap<u64, usize>,
+    /// Length and place of the step used last: at a fixed rate it is the next one, too.
+    last: Option<(u64, usize)>,
 }
 
 /// A stream whose steps never repeat must not fill the memory.
 const MOST_PREPARED: usize = 4096;
 
-impl<E, P> Remembering<E, P> {
+impl<E, P: Copy> Remembering<E, P> {
     pub(crate) fn new(estimator: E, step_factor: f64) -> Self {
-        Self { estimator, step_factor, prepared: RefCell::new(Prepared { steps: HashMap::new(), last: None }) }
+        Self { estimator, step_factor, prepared: RefCell::new(Prepared::new()) }
     }
 }
 
 impl<P: Copy> Prepared<P> {
+    fn new() -> Self {
+        Self { steps: Vec::new(), places: HashMap::new(), last: None }
+    }
+
     fn of(&mut self, dt_s: f64, prepare: impl FnOnce(f64) -> P) -> P {
         let length = dt_s.to_bits();
-        if let Some((last, step)) = self.last
-            && last == length
-        {
-            return step;
+        let place = match self.last {
+            Some((last, place)) if last == length => place,
+            _ => self.place(length, || prepare(dt_s)),
+        };
+        self.last = Some((length, place));
+        self.steps[place]
+    }
+
+    fn place(&mut self, length: u64, prepare: impl FnOnce() -> P) -> usize {
+        if let Some(place) = self.places.get(&length) {
+            return *place;
         }
-        if self.steps.len() >= MOST_PREPARED && !self.steps.contains_key(&length) {
+        if self.steps.len() >= MOST_PREPARED {
             self.steps.clear();
+            self.places.clear();
         }
-        let step = *self.steps.entry(length).or_insert_with(|| prepare(dt_s));
-        self.last = Some((length, step));
-        step
+        self.steps.push(prepare());
+        self.places.insert(length, self.steps.len() - 1);
+        self.steps.len() - 1
     }
 }
 
@@ -108,13 +122,11 @@ where
 
 #[cfg(test)]
 mod tests {
-    use std::collections::HashMap;
-
     use super::{MOST_PREPARED, Prepared};
 
     #[test]
     fn a_length_is_prepared_once_until_there_are_too_many() {
-        let mut prepared = Prepared { steps: HashMap::new(), last: None };
+        let mut prepared = Prepared::new();
         let mut calls = 0;
         let mut of = |dt_s: f64| {
             let prepare = |dt_s| {
