@@ -52,7 +52,7 @@ pub(crate) const SPLIT_SECONDS: [(&str, &str, usize); 9] = [
 /// Reads a date, a time of day or both. No month is a word here, so that no language is meant.
 pub(crate) fn stamp(text: &str, order: Order) -> Option<Stamp> {
     let text = text.trim();
-    if !text.starts_with(|c: char| c.is_ascii_digit()) || !text.contains([':', '-', '/', '.', '_', 'T']) {
+    if !may_be_stamp(text.as_bytes()) {
         return None;
     }
     let (date, time) = date_and_time(text);
@@ -65,6 +65,14 @@ pub(crate) fn stamp(text: &str, order: Order) -> Option<Stamp> {
         None => 0,
     };
     Some(Stamp { nanoseconds: days * DAY + seconds, has_date: date.is_some(), has_time: time.is_some() })
+}
+
+/// True if a text begins with a digit and has what dates or times of day have: two marks between the parts of a date, or what
+/// stands in or before a time of day. Most cells are numbers, and are told from these by one look.
+fn may_be_stamp(text: &[u8]) -> bool {
+    let marks = || text.iter().filter(|byte| matches!(byte, b'-' | b'/' | b'.')).count();
+    let has_time = || text.iter().any(|byte| matches!(byte, b':' | b'_' | b'T' | b' '));
+    text.first().is_some_and(u8::is_ascii_digit) && (marks() >= 2 || has_time())
 }
 
 /// The date and the time of day of a text, of which one may be missing: `2024-05-01 10:30`, `2024/05/01/10:30`,
