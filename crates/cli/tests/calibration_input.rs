@@ -99,10 +99,35 @@ fn readings_that_have_nothing_to_do_with_the_reference_are_refused() {
         cells[1] = (1500.0 + 300.0 * (k as f64 * k as f64 * 0.618_033_988_749_895).fract()).to_string();
     });
     bench.write("random.csv", random);
-    let run = calibrate(&bench, "random.csv", &[]);
-    assert_eq!(run.code, Some(4), "{}", run.stderr);
-    assert!(run.stderr.starts_with("ohmstrain: random.csv: the readings have nothing to do with"), "{}", run.stderr);
-    assert!(!bench.files().contains(&"sensor.toml".to_owned()));
+    // One extension, one hold and one release, played backwards.
+    simulate_extend_hold(&bench, "once.csv");
+    let once = bench.read("once.csv");
+    let readings: Vec<&str> = once.lines().rev().filter_map(|line| line.split(',').nth(1)).collect();
+    let backwards = change_rows(&once, |k, cells| cells[1] = readings[k].to_owned());
+    bench.write("backwards.csv", backwards);
+    for (name, more) in [("random.csv", &[][..]), ("backwards.csv", &["--until", "171"])] {
+        let run = calibrate(&bench, name, more);
+        assert_eq!(run.code, Some(4), "{}", run.stderr);
+        let expected = format!("ohmstrain: {name}: the readings have nothing to do with");
+        assert!(run.stderr.starts_with(&expected), "{}", run.stderr);
+        assert!(!bench.files().contains(&"sensor.toml".to_owned()));
+    }
+}
+
+/// The published protocol with the published material, 342 s: twice an extension, a hold and a release.
+fn simulate_extend_hold(bench: &Bench, name: &str) {
+    let of = ["--protocol", "extend-hold", "--material", "ecoflex-00-50", "--individual", "274", "--seed", "74"];
+    bench.run(&[&["simulate", "-o", name][..], &of].concat()).ok();
+}
+
+/// Of one extension, one hold and one release no part is like another: parts left out tell nothing, and the rows that the law is fitted to
+/// tell that readings and reference belong together.
+#[test]
+fn one_extension_one_hold_and_one_release_calibrate() {
+    let bench = bench();
+    simulate_extend_hold(&bench, "once.csv");
+    calibrate(&bench, "once.csv", &["--until", "171"]).ok();
+    assert!(bench.files().contains(&"sensor.toml".to_owned()));
 }
 
 /// The recording with a column times a factor and a metadata line.
