@@ -13,6 +13,8 @@ const BAUDS = ["9600", "19200", "38400", "57600", "115200", "230400", "250000", 
 /** Lines without a header after which columns are asked for. */
 const LINES_WITHOUT = 8;
 const RAW_LINES = 8;
+/** What comes of a calm stream is taken no more often than this, ms: nobody sees more, and a laptop lasts longer. */
+const CALM_MS = 40;
 
 const chosen = { baud: "115200", frontEnd: "", recording: "", speed: "1" };
 let source: Source | undefined;
@@ -146,6 +148,7 @@ class Session implements Listener {
         if (said.columns.length > 0) this.isHeaded = true;
         if (!this.isHeaded && said.counts.badLines >= LINES_WITHOUT) this.askColumns();
         if (this.record && recorded !== "") this.keep(this.record, recorded);
+        if (this.view.isCalm) await new Promise((wake) => setTimeout(wake, CALM_MS));
       }
     } catch (error) {
       this.view.fail(error instanceof Error ? error.message : String(error));

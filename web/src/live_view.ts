@@ -10,7 +10,7 @@ const WINDOW_S = 30;
 const MOST_POINTS = 800;
 /** Words change no more often than this, ms. */
 const WORDS_MS = 150;
-/** Up to so many rows a second there are half as many frames: nobody sees more, and a laptop lasts longer. */
+/** A stream with up to so many rows a second is calm. */
 const CALM = 300;
 /** Last rows whose times tell how many there are in a second. */
 const RECENT = 100;
@@ -40,7 +40,6 @@ export class LiveView {
   private isDue = false;
   private wordsAt = 0;
   private pending: ReturnType<typeof setTimeout> | undefined;
-  private drawnAt = 0;
 
   constructor(
     private readonly sensor: SensorDescription,
@@ -93,6 +92,12 @@ export class LiveView {
 
   recording(name: string | undefined): void {
     this.recordButton.textContent = name ? `Stop recording ${name}` : "Record";
+  }
+
+  /** Whether there are so few rows that one frame for several of them shows all. */
+  get isCalm(): boolean {
+    const times = this.columns[0] ?? [];
+    return RECENT < CALM * ((times.at(-1) ?? 0) - (times.at(-1 - RECENT) ?? Number.NEGATIVE_INFINITY));
   }
 
   /** Takes rows, what there is to say, and the last lines. */
@@ -161,14 +166,7 @@ export class LiveView {
       this.isDue = false;
       return;
     }
-    const now = performance.now();
-    const isCalm = RECENT < CALM * ((times.at(-1) ?? 0) - (times.at(-1 - RECENT) ?? Number.NEGATIVE_INFINITY));
-    if (isCalm && now - this.drawnAt < 25) {
-      requestAnimationFrame(() => this.draw());
-      return;
-    }
     this.isDue = false;
-    this.drawnAt = now;
     const scale = this.sensor.quantity === "angle_deg" ? 1 : 100;
     const stride = Math.ceil(times.length / MOST_POINTS);
     const time: number[] = [];

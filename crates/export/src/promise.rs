@@ -1,4 +1,4 @@
-//! What an exported filter promises, and what it costs.
+//! Errors and costs that an exported filter promises.
 
 use comfy_table::{Table, presets};
 use ohmstrain_sensor::{Scores, SensorParams};

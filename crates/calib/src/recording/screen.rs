@@ -235,9 +235,9 @@ fn span(values: &[f64]) -> Option<f64> {
 
 /// Shares of the readings' variance that the law leaves.
 struct Unexplained {
-    /// On blocks that it was not fitted to, each in turn.
+    /// Share on blocks that it was not fitted to, each in turn.
     left_out: f64,
-    /// On the rows that it was fitted to.
+    /// Share on the rows that it was fitted to.
     fitted: f64,
 }
 
