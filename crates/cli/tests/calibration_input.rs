@@ -16,7 +16,12 @@ fn bench() -> Bench {
 
 /// Calibrates on the first half of a recording.
 fn calibrate(bench: &Bench, trace: &str, more: &[&str]) -> Run {
-    bench.run(&[&["calibrate", trace, "--until", UNTIL, "-o", "sensor.toml"], &EKF[..], more].concat())
+    calibrate_until(bench, trace, UNTIL, more)
+}
+
+/// Calibrates on the rows of a recording before a time, s.
+fn calibrate_until(bench: &Bench, trace: &str, until: &str, more: &[&str]) -> Run {
+    bench.run(&[&["calibrate", trace, "--until", until, "-o", "sensor.toml"], &EKF[..], more].concat())
 }
 
 /// Error on the second half of `trace.csv`, %FS.
@@ -105,8 +110,8 @@ fn readings_that_have_nothing_to_do_with_the_reference_are_refused() {
     let readings: Vec<&str> = once.lines().rev().filter_map(|line| line.split(',').nth(1)).collect();
     let backwards = change_rows(&once, |k, cells| cells[1] = readings[k].to_owned());
     bench.write("backwards.csv", backwards);
-    for (name, more) in [("random.csv", &[][..]), ("backwards.csv", &["--until", "171"])] {
-        let run = calibrate(&bench, name, more);
+    for (name, until) in [("random.csv", UNTIL), ("backwards.csv", ONCE)] {
+        let run = calibrate_until(&bench, name, until, &[]);
         assert_eq!(run.code, Some(4), "{}", run.stderr);
         let expected = format!("ohmstrain: {name}: the readings have nothing to do with");
         assert!(run.stderr.starts_with(&expected), "{}", run.stderr);
@@ -114,7 +119,10 @@ fn readings_that_have_nothing_to_do_with_the_reference_are_refused() {
     }
 }
 
-/// The published protocol with the published material, 342 s: twice an extension, a hold and a release.
+/// Seconds of the published protocol until it begins again.
+const ONCE: &str = "171";
+
+/// The published protocol with the published material: twice an extension, a hold and a release.
 fn simulate_extend_hold(bench: &Bench, name: &str) {
     let of = ["--protocol", "extend-hold", "--material", "ecoflex-00-50", "--individual", "274", "--seed", "74"];
     bench.run(&[&["simulate", "-o", name][..], &of].concat()).ok();
@@ -126,7 +134,7 @@ fn simulate_extend_hold(bench: &Bench, name: &str) {
 fn one_extension_one_hold_and_one_release_calibrate() {
     let bench = bench();
     simulate_extend_hold(&bench, "once.csv");
-    calibrate(&bench, "once.csv", &["--until", "171"]).ok();
+    calibrate_until(&bench, "once.csv", ONCE, &[]).ok();
     assert!(bench.files().contains(&"sensor.toml".to_owned()));
 }
 
