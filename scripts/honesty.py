@@ -5,7 +5,7 @@ scripts/honesty.py PROGRAM [--only PART] [--check] [--jobs N]
 
 PROGRAM is the command line. Each case is simulated, calibrated on its first half, and scored on its second half. PART chooses
 cases whose name contains it; then the page is left as it is. With --check the rows are compared with the page's: exit code 1 where
-they differ. Needs gcc. Takes about half an hour on two processors.
+they differ. Needs gcc. Takes half an hour of processor time.
 """
 
 import argparse
@@ -29,7 +29,7 @@ HEAD = [
 ]
 #: A miss is far where the truth is so much of full scale beyond the 95 % interval.
 FAR = 0.1
-#: Flags of rows that say themselves that they are doubtful. `ramp_border` and `long_run` do not.
+#: Flags of rows that say themselves that they are doubtful. The others are named in the page.
 DOUBTS = ("missing", "saturated", "implausible", "stuck", "rejected", "start_up", "recovering", "extrapolated", "rest_moved")
 
 
@@ -41,11 +41,11 @@ class Case:
     simulate: list
     #: Seconds without a row in the middle of the second half.
     pause_s: float = 0.0
-    #: Whether the filter begins with the second half, in mid-motion.
+    #: True if the filter begins with the second half, in mid-motion.
     is_started_late: bool = False
 
 
-#: What estimates, and how the command line is asked to.
+#: Names of the rows of a case, and the words of the command line that estimate.
 WAYS = {"filter": ["filter"], "exported C": ["export"], "smoother": ["smooth"], "`ekf`": ["filter", "--estimator", "ekf"]}
 
 
