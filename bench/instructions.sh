@@ -11,8 +11,7 @@ set -euo pipefail
 cd "$(dirname "$0")"
 
 if ! command -v valgrind >/dev/null; then
-    apt-get -q update >/dev/null
-    DEBIAN_FRONTEND=noninteractive apt-get -q install -y --no-install-recommends valgrind >/dev/null
+    ../scripts/apt.sh valgrind
 fi
 
 # The same code on every machine, whatever the surroundings ask for.

@@ -15,9 +15,7 @@ update=0
 [[ ${1:-} != --update ]] || update=1
 
 if ! command -v qemu-system-arm >/dev/null || ! command -v arm-none-eabi-nm >/dev/null; then
-    apt-get -q update >/dev/null
-    DEBIAN_FRONTEND=noninteractive apt-get -q install -y --no-install-recommends \
-        qemu-system-arm binutils-arm-none-eabi >/dev/null
+    ../scripts/apt.sh qemu-system-arm binutils-arm-none-eabi
 fi
 
 host() { cargo run --quiet --locked -p ohmstrain-embedded-host -- "$@"; }

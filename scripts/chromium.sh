@@ -6,6 +6,5 @@ set -euo pipefail
 has() { command -v "$1" >/dev/null; }
 if ! { has chromium || has chromium-browser || has google-chrome || has chrome; } ||
     ! compgen -G "/usr/share/fonts/truetype/*/*Sans*.ttf" >/dev/null; then
-    apt-get -q update >/dev/null
-    DEBIAN_FRONTEND=noninteractive apt-get -q install -y --no-install-recommends chromium fonts-dejavu-core >/dev/null
+    "$(dirname "$0")/apt.sh" chromium fonts-dejavu-core
 fi

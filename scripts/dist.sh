@@ -2,6 +2,9 @@
 # A stripped binary with manual pages, completions and licences, as dist/ohmstrain-VERSION-TARGET.tar.gz.
 #
 #   dist.sh [--target TRIPLE]    another target's binary must run here, for the pages
+#
+# Environment:
+#   BUILD  cargo's command that builds it; default: build. zigbuild brings a C compiler for targets with another C library
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -14,7 +17,7 @@ case "${1:-}" in
 esac
 target=${2:-$(rustc -vV | sed -n 's/^host: //p')}
 OHMSTRAIN_COMMIT=$(git rev-parse HEAD 2>/dev/null || true) \
-    cargo build --locked --profile dist -p ohmstrain-cli --target "$target"
+    cargo "${BUILD:-build}" --locked --profile dist -p ohmstrain-cli --target "$target"
 binary=${CARGO_TARGET_DIR:-target}/$target/dist/ohmstrain
 
 name=ohmstrain-$("$binary" --version | cut -d' ' -f2)-$target

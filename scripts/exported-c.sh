@@ -22,10 +22,8 @@ trap 'rm -rf "$work"' EXIT
 
 if ! command -v clang >/dev/null || ! command -v gcc >/dev/null || ! command -v qemu-system-arm >/dev/null ||
     ! command -v cmake >/dev/null || ! command -v avr-gcc >/dev/null || ! command -v simavr >/dev/null || [[ ! -d /usr/share/arduino/hardware/arduino/avr ]] || ! echo '#include <math.h>' | arm-none-eabi-gcc -E - >/dev/null 2>&1; then
-    apt-get -q update >/dev/null
-    DEBIAN_FRONTEND=noninteractive apt-get -q install -y --no-install-recommends \
-        gcc g++ clang cmake make libc6-dev gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm \
-        gcc-avr avr-libc simavr arduino-core-avr >/dev/null
+    scripts/apt.sh gcc g++ clang cmake make libc6-dev \
+        gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm gcc-avr avr-libc simavr arduino-core-avr
 fi
 
 ohmstrain=${OHMSTRAIN:-}

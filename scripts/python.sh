@@ -16,12 +16,10 @@ cd "$(dirname "$0")/.."
 readonly venv=${VENV:-$PWD/target/python}
 
 if ! command -v "${PYTHON3:-python3}" >/dev/null || ! "${PYTHON3:-python3}" -c 'import venv, ensurepip' 2>/dev/null; then
-    apt-get -q update >/dev/null
-    DEBIAN_FRONTEND=noninteractive apt-get -q install -y --no-install-recommends python3 python3-venv >/dev/null
+    scripts/apt.sh python3 python3-venv
 fi
 if [[ ${1:-} == --engines* ]] && ! command -v java >/dev/null; then
-    apt-get -q update >/dev/null
-    DEBIAN_FRONTEND=noninteractive apt-get -q install -y --no-install-recommends default-jre-headless >/dev/null
+    scripts/apt.sh default-jre-headless
 fi
 [[ -x $venv/bin/python ]] || "${PYTHON3:-python3}" -m venv "$venv"
 "$venv/bin/python" -m pip install --quiet 'maturin>=1.9,<2'

@@ -4,23 +4,58 @@
 #   release.sh                every part
 #   release.sh PART...        archive  the program with man pages and completions (dist.sh)
 #                             deb      the same as a Debian package
-#                             wheel    the Python package, which brings the program
+#                             wheel    the Python package, which brings the program, for glibc 2.17 and for musl
 #                             npm      the package for browsers and Node, and the page (web.sh)
+#                             c        an exported filter of a simulated sensor as an Arduino library, for C compilers too
 #                             crates   a .crate file for each crate, each built from what is in it
+#                             check    licences and advisories of dependencies (deny.toml), and whether the program compiles with the
+#                                      oldest Rust, for Windows and for macOS
 #
-# Prints size and, of programs, the oldest glibc that will do: that of the machine that built them at most.
+# Prints the size of each, the oldest glibc that will do, and how long the job took that it was tried on.
 #
 # Environment:
-#   TARGET  another target of Rust's for archive and deb, one that runs here: x86_64-unknown-linux-musl needs no glibc
+#   TARGET  the program's target, one that runs here. Default: on Linux the processor's *-unknown-linux-musl, if rustup has it: a
+#           program that needs no library at all. Else the machine's own.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-readonly out=$PWD/dist/release target=${TARGET:-$(rustc -vV | sed -n 's/^host: //p')}
+readonly out=$PWD/dist/release tools=${CARGO_TARGET_DIR:-$PWD/target}/release-tools host=$(rustc -vV | sed -n 's/^host: //p')
 readonly version=$(sed -n '/^\[workspace.package\]/,/^version/s/^version = "\(.*\)"/\1/p' Cargo.toml)
-readonly folder=$PWD/dist/ohmstrain-$version-$target
 
 die() {
     printf 'release: %s\n' "$*" >&2
     exit 1
+}
+
+has_target() {
+    timeout 120 rustup target add "$1" >/dev/null 2>&1
+}
+
+target() {
+    local static=${host%%-*}-unknown-linux-musl
+    if [[ -z ${TARGET:-} && $host == *-linux-gnu ]] && has_target "$static"; then
+        echo "$static"
+    else
+        echo "${TARGET:-$host}"
+    fi
+}
+
+# Zig, which brings the headers of other C libraries, and what drives it; from PyPI.
+tools() {
+    [[ -x $tools/bin/python ]] || "${PYTHON3:-python3}" -m venv "$tools"
+    "$tools/bin/python" -m pip install --quiet 'cargo-zigbuild>=0.20' 'ziglang>=0.13' 'maturin>=1.9,<2' 'wheel>=0.45'
+}
+
+# The folder with the program, man pages and completions, made once a run.
+has_program=
+program() {
+    [[ -z $has_program ]] || return 0
+    has_program=yes
+    if [[ $target == *-musl ]]; then
+        tools
+        PATH=$tools/bin:$PATH BUILD=zigbuild scripts/dist.sh --target "$target" >/dev/null
+    else
+        scripts/dist.sh --target "$target" >/dev/null
+    fi
 }
 
 # The oldest glibc that has what a program asks for.
@@ -28,38 +63,44 @@ glibc() {
     objdump -T "$1" 2>/dev/null | grep -o 'GLIBC_[0-9.]*' | sort -Vu | tail -n 1 | sed 's/_/ /' | grep . || echo "no glibc"
 }
 
+# made FILE WHAT-IT-NEEDS SECONDS
 made() {
-    printf '%-60s %10d bytes, %s\n' "$(basename "$1")" "$(wc -c <"$1")" "${2:-any system}"
+    printf '%-58s %9d bytes, %s%s\n' "$(basename "$1")" "$(wc -c <"$1")" "${2:-any system}" "${3:+, tried in $3 s}"
 }
 
-# Makes a recording, calibrates on it and filters it with a program.
+# Makes a recording, calibrates on it and filters it with a program; prints the seconds that took.
 try_program() {
-    local clean
+    local clean start=$SECONDS
     clean=$(mktemp -d)
     (
         cd "$clean"
-        "$1" -q simulate --protocol mixed --speed-mm-s 5 --sample-rate-hz 5 --mismatched -o trace.csv
-        "$1" -q calibrate trace.csv --estimator ekf -o sensor.toml
+        "$1" -q example -o trace.csv
+        "$1" -q calibrate trace.csv --until 200 -o sensor.toml
         "$1" -q filter trace.csv --sensor sensor.toml -o strain.csv
-        [[ $(wc -l <strain.csv) -gt 2000 ]] || die "$1 filtered nothing"
+        [[ $(wc -l <strain.csv) -gt 8000 ]] || die "$1 filtered nothing"
     )
     rm -rf "$clean"
+    echo $((SECONDS - start))
 }
 
 archive() {
-    TARGET= scripts/dist.sh --target "$target" >/dev/null
+    program
     cp "$folder.tar.gz" "$out"
-    local clean
+    local clean seconds
     clean=$(mktemp -d)
     tar -C "$clean" -xzf "$out/$(basename "$folder").tar.gz"
-    try_program "$clean/$(basename "$folder")/ohmstrain"
+    seconds=$(try_program "$clean/$(basename "$folder")/ohmstrain")
+    if [[ $target == *-musl && $EUID -eq 0 ]]; then
+        # Where there is nothing else: no shell, no library, no folder for temporary files.
+        (cd "$clean" && chroot . "/$(basename "$folder")/ohmstrain" -q example -o /trace.csv)
+    fi
     rm -rf "$clean"
-    made "$out/$(basename "$folder").tar.gz" "$(glibc "$folder/ohmstrain")"
+    made "$out/$(basename "$folder").tar.gz" "$(glibc "$folder/ohmstrain")" "$seconds"
 }
 
 deb() {
-    [[ -x $folder/ohmstrain ]] || scripts/dist.sh --target "$target" >/dev/null
-    local root floor package
+    program
+    local root floor package seconds
     root=$(mktemp -d)
     floor=$(glibc "$folder/ohmstrain")
     install -Dm755 "$folder/ohmstrain" "$root/usr/bin/ohmstrain"
@@ -89,38 +130,80 @@ EOF
     rm -rf "$root"
     root=$(mktemp -d)
     dpkg-deb --extract "$package" "$root"
-    try_program "$root/usr/bin/ohmstrain"
+    seconds=$(try_program "$root/usr/bin/ohmstrain")
     rm -rf "$root"
-    made "$package" "$floor"
+    made "$package" "$floor" "$seconds"
 }
 
-# The wheel of scripts/python.sh with the program among its scripts.
+# A wheel for each C library of Linux, linked by zig, with the program among its scripts; on other systems one for the machine.
 wheel() {
-    [[ -x $folder/ohmstrain ]] || scripts/dist.sh --target "$target" >/dev/null
-    local python work clean
-    python=$(scripts/python.sh)
-    "$python" -m pip install --quiet 'wheel>=0.45'
-    work=$(mktemp -d)
-    "$python" -m wheel unpack --dest "$work" target/python/wheels/ohmstrain-*.whl >/dev/null
-    install -Dm755 -t "$work/ohmstrain-$version/ohmstrain-$version.data/scripts" "$folder/ohmstrain"
+    program
+    tools
+    local python=$tools/bin/python wheels seconds clean
+    wheels=$(mktemp -d)
     rm -f "$out"/ohmstrain-*.whl
-    "$python" -m wheel pack --dest-dir "$out" "$work/ohmstrain-$version" >/dev/null
-    rm -rf "$work"
+    if [[ $host == *-linux-gnu ]]; then
+        build_wheel --zig --target "$host" --compatibility manylinux_2_17
+        if has_target "${host/gnu/musl}"; then
+            build_wheel --zig --target "${host/gnu/musl}" --compatibility musllinux_1_2
+        else
+            echo "NOT MADE: the wheel for musl, since rustup has no ${host/gnu/musl} here" >&2
+        fi
+    else
+        build_wheel
+    fi
+    rm -rf "$wheels"
     clean=$(mktemp -d)
     "${PYTHON3:-python3}" -m venv "$clean"
-    "$clean/bin/python" -m pip install --quiet "$out"/ohmstrain-*.whl
-    try_program "$clean/bin/ohmstrain"
+    # Of this machine's wheels pip takes the one that suits.
+    "$clean/bin/python" -m pip install --quiet --find-links "$out" "ohmstrain==$version"
+    seconds=$(try_program "$clean/bin/ohmstrain")
     "$clean/bin/python" -c 'import ohmstrain'
     rm -rf "$clean"
-    made "$(echo "$out"/ohmstrain-*.whl)" "$(glibc "$folder/ohmstrain")"
+    local file
+    for file in "$out"/ohmstrain-*.whl; do
+        # Nothing here runs what is for musl's Python.
+        [[ $file != *musllinux* ]] || seconds=
+        made "$file" "program: $(glibc "$folder/ohmstrain")" "$seconds"
+    done
+}
+
+# build_wheel FLAG OF maturin...
+build_wheel() {
+    local made work
+    (cd crates/python && PATH=$tools/bin:$PATH "$python" -m maturin build --quiet --release --locked --out "$wheels" "$@" >&2)
+    made=$(echo "$wheels"/*.whl)
+    work=$(mktemp -d)
+    "$python" -m wheel unpack --dest "$work" "$made" >/dev/null
+    install -Dm755 -t "$work/ohmstrain-$version/ohmstrain-$version.data/scripts" "$folder/ohmstrain"
+    "$python" -m wheel pack --dest-dir "$out" "$work/ohmstrain-$version" >/dev/null
+    rm -rf "$work" "$made"
 }
 
 npm() {
-    [[ -x scripts/web.sh ]] || die "npm: there is no scripts/web.sh"
     scripts/web.sh --package "$out"
     cp web/dist/index.html "$out/ohmstrain-page.html"
     made "$(echo "$out"/ohmstrain-*.tgz)" "Node 20 or a browser"
     made "$out/ohmstrain-page.html" "a browser"
+}
+
+# The example sensor's filter: an Arduino library, and C that any compiler takes.
+c() {
+    program
+    local clean file=$out/ohmstrain-c-$version.zip start
+    clean=$(mktemp -d)
+    "$folder/ohmstrain" -q export --sensor crates/ohmstrain/examples/sensor.toml --target c --dt-s 0.05 -o "$clean/ohmstrain" >/dev/null
+    rm -f "$file"
+    (cd "$clean" && python3 -m zipfile -c "$file" ohmstrain)
+    rm -rf "$clean"
+    clean=$(mktemp -d)
+    python3 -m zipfile -e "$file" "$clean"
+    start=$SECONDS
+    # As its README says.
+    (cd "$clean/ohmstrain" && cc -std=c99 -O2 -ffp-contract=off -Isrc src/ohmstrain.c selftest/selftest.c -lm -o selftest/run &&
+        selftest/run) >/dev/null
+    rm -rf "$clean"
+    made "$file" "a C99 compiler" $((SECONDS - start))
 }
 
 crates() {
@@ -132,11 +215,44 @@ crates() {
     done
 }
 
+# Licences and sources of dependencies, and advisories where their list can be had; then compiles, without linking, with the
+# oldest Rust and for systems that nothing here runs on.
+check() {
+    cargo install --quiet --locked --root "$tools/cargo" --version '^0.20' cargo-deny
+    "$tools/cargo/bin/cargo-deny" --log-level error check licenses bans sources
+    if timeout 20 git ls-remote https://github.com/RustSec/advisory-db HEAD >/dev/null 2>&1; then
+        "$tools/cargo/bin/cargo-deny" --log-level error check advisories
+    else
+        echo "NOT CHECKED: advisories, since their list cannot be had here" >&2
+    fi
+    local minimum system
+    minimum=$(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
+    if timeout 300 rustup toolchain install "$minimum" --profile minimal >/dev/null 2>&1; then
+        cargo "+$minimum" check --quiet --locked -p ohmstrain-cli --target-dir "$tools/minimum"
+        echo "Rust $minimum: compiles"
+    else
+        echo "NOT CHECKED: Rust $minimum, since rustup does not have it here" >&2
+    fi
+    tools
+    for system in x86_64-pc-windows-gnu aarch64-apple-darwin; do
+        if has_target "$system"; then
+            PATH=$tools/bin:$PATH cargo-zigbuild check --quiet --locked -p ohmstrain-cli --target "$system"
+            echo "$system: compiles"
+        else
+            echo "NOT CHECKED: $system, since rustup does not have it here" >&2
+        fi
+    done
+}
+
+readonly all="archive deb wheel npm c crates check"
 parts=("$@")
-((${#parts[@]})) || parts=(archive deb wheel npm crates)
+((${#parts[@]})) || read -ra parts <<<"$all"
 for part in "${parts[@]}"; do
-    [[ " archive deb wheel npm crates " == *" $part "* ]] || die "expected archive, deb, wheel, npm or crates, found $part"
+    [[ " $all " == *" $part "* ]] || die "expected one of $all, found $part"
 done
+[[ -e tests/released/$version ]] || die "no tests/released/$version: run scripts/released.sh"
+target=$(target)
+readonly target folder=$PWD/dist/ohmstrain-$version-$target
 mkdir -p "$out"
 for part in "${parts[@]}"; do
     "$part"

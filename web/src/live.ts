@@ -14,7 +14,7 @@ const BAUDS = ["9600", "19200", "38400", "57600", "115200", "230400", "250000", 
 const LINES_WITHOUT = 8;
 const RAW_LINES = 8;
 /** What comes of a calm stream is taken no more often than this, ms: nobody sees more, and a laptop lasts longer. */
-const CALM_MS = 40;
+const CALM_MS = 66;
 
 const chosen = { baud: "115200", frontEnd: "", recording: "", speed: "1" };
 let source: Source | undefined;

@@ -20,15 +20,21 @@ test("a nasty lab file becomes a calibrated sensor and firmware, all as the comm
   const folder = new Folder();
   const lab = nasty(simulated(folder, 3), 30);
   folder.put("pruefstand.csv", lab);
-  const { page, requests, complaints } = await open(browser);
-  await drop(page, { name: "pruefstand.csv", bytes: lab });
+  const steps = new Steps();
+  const { page, requests, complaints } = await steps.take("open the page", () => open(browser));
+  await steps.take("drop the file", async () => {
+    await drop(page, { name: "pruefstand.csv", bytes: lab });
+    await page.locator(".question").waitFor();
+  });
 
   // It asks what the command line asks, and reads again once it is answered.
   const question = folder.refusal("import", "pruefstand.csv", "-o", "trace.csv");
   await expect.poll(() => page.locator(".question").textContent()).toBe(question);
-  await page.locator("input[name=length]").fill("30");
-  await page.locator("input[name=length]").press("Enter");
-  await page.locator(".plot canvas").first().waitFor();
+  await steps.take("answer its question, see the plot", async () => {
+    await page.locator("input[name=length]").fill("30");
+    await page.locator("input[name=length]").press("Enter");
+    await page.locator(".plot canvas").first().waitFor();
+  });
   expect(await page.locator(".question").count()).toBe(0);
   const printed = folder.run("inspect", "pruefstand.csv", "--gauge-length-mm", "30");
   await page.locator("#recordings .lines").waitFor();
@@ -38,38 +44,62 @@ test("a nasty lab file becomes a calibrated sensor and firmware, all as the comm
   const trace = await download(page, () => page.getByText("Download trace.csv").click());
   expect(trace.equals(folder.get("trace.csv"))).toBe(true);
 
-  await page.locator("#start").click();
-  await page.locator("#verdict").waitFor({ timeout: 600_000 });
+  await steps.take("calibrate", async () => {
+    await page.locator("#start").click();
+    await page.locator("#verdict").waitFor({ timeout: 600_000 });
+  });
   const closing = folder.run("calibrate", "trace.csv", "-o", "sensor.toml", "--report", "report.html", "--figures", "figures");
   expect(withoutSeconds(await lines(page, "#verdict"))).toBe(withoutSeconds(closing));
   const toml = await download(page, () => page.locator("#save-sensor").click());
   expect(toml.toString()).toBe(folder.get("sensor.toml").toString());
   expect(await page.getByText("Left out: each quarter").count()).toBe(1);
 
-  await page.getByText("Filter and smooth").click();
-  const filtered = await download(page, () => page.getByText("Download estimates.csv").click());
+  const filtered = await steps.take("filter and smooth", async () => {
+    await page.getByText("Filter and smooth").click();
+    return download(page, () => page.getByText("Download estimates.csv").click());
+  });
   folder.run("filter", "trace.csv", "--sensor", "sensor.toml", "-o", "filtered.csv");
   expect(filtered.equals(folder.get("filtered.csv"))).toBe(true);
   const smoothed = await download(page, () => page.getByText("Download smoothed.csv").click());
   folder.run("smooth", "trace.csv", "--sensor", "sensor.toml", "-o", "smoothed.csv");
   expect(smoothed.equals(folder.get("smoothed.csv"))).toBe(true);
-  const report = unzipSync(await download(page, () => page.getByText("Download report and figures").click()));
+  const reported = () => download(page, () => page.getByText("Download report and figures").click());
+  const report = unzipSync(await steps.take("save report and figures", reported));
   for (const [name, bytes] of Object.entries(report)) expect(Buffer.from(bytes).equals(folder.get(name)), name).toBe(true);
 
-  await page.locator("#make-firmware").click();
-  await page.locator(".costs").waitFor();
+  await steps.take("make firmware", async () => {
+    await page.locator("#make-firmware").click();
+    await page.locator(".costs").waitFor();
+  });
   await checkAccess(page);
   await picture(page, "page-light");
   await picture(page, "readme", "section[aria-labelledby=step-2]");
-  const zip = await download(page, () => page.locator("#save-firmware").click());
+  const zip = await steps.take("save it", () => download(page, () => page.locator("#save-firmware").click()));
   const step = await page.getByLabel("Time between two readings, s").inputValue();
   folder.run("export", "--sensor", "sensor.toml", "--target", "c", "--dt-s", step, "-o", "firmware");
   compileAndTest(folder, zip);
 
   expect(complaints).toEqual([]);
   expect(requests.filter((url) => !/^(file|blob|data):/.test(url))).toEqual([]);
-  console.log(`a lab file to firmware, and the command line beside it: ${((performance.now() - started) / 1000).toFixed(0)} s`);
+  console.log(`a lab file to firmware: ${steps.text()}; with the command line beside it ${((performance.now() - started) / 1000).toFixed(0)} s`);
 });
+
+/** What each step of a person's work takes, without what the test does beside it. */
+class Steps {
+  readonly #taken: [string, number][] = [];
+
+  async take<T>(name: string, step: () => Promise<T>): Promise<T> {
+    const start = performance.now();
+    const done = await step();
+    this.#taken.push([name, (performance.now() - start) / 1000]);
+    return done;
+  }
+
+  text(): string {
+    const all = this.#taken.reduce((sum, [, seconds]) => sum + seconds, 0);
+    return [...this.#taken, ["all", all] as const].map(([name, seconds]) => `${name} ${seconds.toFixed(1)} s`).join(", ");
+  }
+}
 
 /** The words of a command as a shell takes them. */
 function words(command: string): string[] {

@@ -1,7 +1,7 @@
 use ohmstrain_ekf::Gaussian;
 use ohmstrain_ekf::correction::{
-    BLOCK, Correction, FILTER_INPUTS, INDUCING, InputScale, Process, RowBlock, Rows, Simulated, Triangle, block_of,
-    stripes,
+    BLOCK, Correction, FILTER_INPUTS, INDUCING, InputRows, InputScale, Process, RowBlock, Simulated, Triangle,
+    block_of, stripes,
 };
 use ohmstrain_model::StrainRange;
 
@@ -60,12 +60,12 @@ impl Filter for Corrected {
     #[inline]
     fn step(&mut self, reading: f64) -> bool {
         let simulated = Simulated {
-            rows: Rows::new(&self.rows, SIMULATED),
+            rows: InputRows::new(&self.rows, SIMULATED),
             scales: &self.scales,
             process: Process { explained: Triangle::NONE, ..self.process(2.5) },
         };
         let correction = Correction {
-            rows: Rows::new(&self.rows, ROWS),
+            rows: InputRows::new(&self.rows, ROWS),
             scales: &self.scales,
             direct: self.process(2.0),
             one_sided: [],

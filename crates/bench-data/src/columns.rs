@@ -52,12 +52,12 @@ impl Column {
 
 /// A column and its place in a row.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Place {
+pub(crate) struct ColumnPlace {
     pub column: Column,
     index: usize,
 }
 
-impl Place {
+impl ColumnPlace {
     pub(crate) fn cell<'a>(&self, record: &'a StringRecord) -> &'a str {
         record.get(self.index).unwrap_or_default().trim()
     }
@@ -66,10 +66,10 @@ impl Place {
 /// Places of a file's columns.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Columns {
-    pub time: Place,
-    pub reading: Place,
-    pub reference: Option<Place>,
-    pub temperature: Option<Place>,
+    pub time: ColumnPlace,
+    pub reading: ColumnPlace,
+    pub reference: Option<ColumnPlace>,
+    pub temperature: Option<ColumnPlace>,
     pub width: usize,
 }
 
@@ -93,15 +93,15 @@ impl Columns {
 }
 
 /// The one column of a group, or none.
-fn one_of(header: &StringRecord, group: &[Column]) -> Result<Option<Place>, Fault> {
-    let mut seen: Option<Place> = None;
+fn one_of(header: &StringRecord, group: &[Column]) -> Result<Option<ColumnPlace>, Fault> {
+    let mut seen: Option<ColumnPlace> = None;
     for (index, name) in header.iter().enumerate() {
         let Some(column) = group.iter().copied().find(|column| column.name() == name.trim()) else { continue };
         if let Some(first) = seen {
             let found = format!("{} and {}", quote(first.column.name()), quote(column.name()));
             return Err(Fault::in_column(column.name(), format!("one column {}", names(group, " or ")), found));
         }
-        seen = Some(Place { column, index });
+        seen = Some(ColumnPlace { column, index });
     }
     Ok(seen)
 }

@@ -3,7 +3,7 @@ use ohmstrain_model::{AdcCode, FrontEnd, Joint};
 
 use crate::cell;
 use crate::clock::{Clock, LastTime};
-use crate::columns::{Column, Columns, Place};
+use crate::columns::{Column, ColumnPlace, Columns};
 use crate::error::Fault;
 use crate::metadata::{Metadata, ResistanceUnit, StrainUnit};
 use crate::row::{Reading, ReadingKind, ReferenceQuantity, Row};
@@ -102,7 +102,7 @@ impl Conversion {
         })
     }
 
-    fn reading(&self, place: &Place, record: &StringRecord) -> Result<Reading, Fault> {
+    fn reading(&self, place: &ColumnPlace, record: &StringRecord) -> Result<Reading, Fault> {
         let cell = place.cell(record);
         let missing = Reading { value: f64::NAN, sd_ohm: None, code: None, saturated: false };
         let (Column::Adc, Some(front_end)) = (place.column, &self.front_end) else {
@@ -119,7 +119,7 @@ impl Conversion {
         })
     }
 
-    fn reference(&self, place: &Place, record: &StringRecord) -> Result<f64, Fault> {
+    fn reference(&self, place: &ColumnPlace, record: &StringRecord) -> Result<f64, Fault> {
         let value = cell::number(place.column.name(), place.cell(record))?;
         Ok(match (place.column, &self.joint) {
             (Column::DisplacementMm, _) => value / self.gauge_length_mm,

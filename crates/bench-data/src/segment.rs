@@ -49,7 +49,7 @@ pub fn segment(time_s: &[f64], strain: &[f64]) -> Vec<Segment> {
     if rows == 0 {
         return Vec::new();
     }
-    let motion = Motion::estimate(time_s, strain);
+    let motion = VisibleMotion::estimate(time_s, strain);
     let phase = |rate: &f64| match *rate {
         rate if rate > motion.threshold => Phase::Extend,
         rate if rate < -motion.threshold => Phase::Retract,
@@ -63,13 +63,13 @@ pub fn segment(time_s: &[f64], strain: &[f64]) -> Vec<Segment> {
 }
 
 /// Motion of the body, as far as the noise lets it be seen.
-struct Motion {
+struct VisibleMotion {
     rate: Vec<f64>,
     threshold: f64,
     shortest_s: f64,
 }
 
-impl Motion {
+impl VisibleMotion {
     fn estimate(time_s: &[f64], strain: &[f64]) -> Self {
         let noise = noise_sd(time_s, strain);
         let step_s = median(time_s.windows(2).map(|pair| pair[1] - pair[0]).collect()).unwrap_or(1.0);

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use ohmstrain_calib::{CalibrationError, FusionChannel, FusionFit, LeftOutRow, Samples, fit_fusion};
 use ohmstrain_sensor::Quantity;
-use ohmstrain_sensor::fusion::{ChannelState, Fused, Fusion, Voice};
+use ohmstrain_sensor::fusion::{ChannelState, Fused, Fusion, Member};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -78,7 +78,7 @@ fn run(fit: &FusionFit, made: &Made, change: impl Fn(usize, &mut Vec<f64>)) -> V
     let step = |k: usize| {
         let mut ln_r: Vec<f64> = (0..CHANNELS).map(|c| (made.reading[c][k] / REST[c]).ln()).collect();
         change(k, &mut ln_r);
-        let state = |(c, ln_r): (usize, f64)| ChannelState { ln_r, own: Voice { strain: made.own[c][k], sd: SD[c] } };
+        let state = |(c, ln_r): (usize, f64)| ChannelState { ln_r, own: Member { strain: made.own[c][k], sd: SD[c] } };
         fusion.step(made.time_s[k], &ln_r.into_iter().enumerate().map(state).collect::<Vec<_>>())
     };
     (0..ROWS).map(step).collect()

@@ -34,7 +34,7 @@ pub use plan::PlanArgs;
 pub use refine::RefineArgs;
 pub use serial_check::SerialCheckArgs;
 pub use shell::{CompletionsArgs, ManArgs};
-pub use simulate::{DemoArgs, DemoMaterial, SimulateArgs};
+pub use simulate::{DemoArgs, DemoMaterial, ExampleArgs, SimulateArgs};
 pub use split::Split;
 pub use trace::{ReplaceArgs, SetupArgs, UnitArgs};
 
@@ -84,6 +84,12 @@ pub enum Command {
     /// Simulate a bench session, calibrate on its first half, filter, smooth and report; needs no input
     #[command(before_help = "Example: ohmstrain demo --out ohmstrain-demo")]
     Demo(DemoArgs),
+    /// Write a recording to try the other commands on: that of the demo
+    #[command(
+        before_help = "Example: ohmstrain example -o trace.csv",
+        after_help = "Then: ohmstrain calibrate trace.csv --until 200 -o sensor.toml\n      ohmstrain smooth trace.csv --sensor sensor.toml -o strain.csv"
+    )]
+    Example(ExampleArgs),
     /// Say what stands in a lab's files, and how to import them
     #[command(before_help = "Example: ohmstrain inspect rig.csv --gauge-length-mm 40")]
     Inspect(InspectArgs),

@@ -9,12 +9,12 @@ use crate::parquet_table::ParquetTable;
 
 /// Writes estimates: one row per reading, cells that are not known left empty.
 pub struct EstimateWriter<W: Write + Send> {
-    rows: Rows<W>,
+    rows: RowSink<W>,
     columns: Vec<Column>,
     count: u64,
 }
 
-enum Rows<W: Write + Send> {
+enum RowSink<W: Write + Send> {
     Csv(RowWriter<W>),
     Parquet(Box<ParquetTable<W>>),
 }
@@ -27,11 +27,11 @@ impl<W: Write + Send> EstimateWriter<W> {
                 let mut rows = RowWriter::new(out);
                 columns.iter().for_each(|column| rows.text(column.name()));
                 rows.end()?;
-                Rows::Csv(rows)
+                RowSink::Csv(rows)
             }
             Format::Parquet => {
                 let named = columns.iter().map(|column| (column.name(), !column.is_flags()));
-                Rows::Parquet(Box::new(ParquetTable::new(out, named)?))
+                RowSink::Parquet(Box::new(ParquetTable::new(out, named)?))
             }
         };
         Ok(Self { rows, columns, count: 0 })
@@ -58,16 +58,16 @@ impl<W: Write + Send> EstimateWriter<W> {
     /// Hands everything written so far on to the reader, as far as the format lets it.
     pub fn flush(&mut self) -> Result<(), CliError> {
         match &mut self.rows {
-            Rows::Csv(rows) => Ok(rows.flush()?),
-            Rows::Parquet(_) => Ok(()),
+            RowSink::Csv(rows) => Ok(rows.flush()?),
+            RowSink::Parquet(_) => Ok(()),
         }
     }
 
     /// Writes the end; how many rows there are.
     pub fn finish(self) -> Result<u64, CliError> {
         match self.rows {
-            Rows::Csv(mut rows) => rows.flush()?,
-            Rows::Parquet(rows) => rows.finish()?.flush()?,
+            RowSink::Csv(mut rows) => rows.flush()?,
+            RowSink::Parquet(rows) => rows.finish()?.flush()?,
         }
         Ok(self.count)
     }
@@ -75,7 +75,7 @@ impl<W: Write + Send> EstimateWriter<W> {
 
 /// Writes one row, calling `number` for each column in order.
 fn write_row<W: Write + Send>(
-    rows: &mut Rows<W>,
+    rows: &mut RowSink<W>,
     columns: &[Column],
     mut number: impl FnMut(&Column) -> f64,
     flags: Flags,
@@ -83,15 +83,15 @@ fn write_row<W: Write + Send>(
     for column in columns {
         let value = number(column);
         match (&mut *rows, column.is_flags()) {
-            (Rows::Csv(rows), true) => rows.words(flags.names()),
-            (Rows::Csv(rows), false) => rows.number(value),
-            (Rows::Parquet(rows), true) => rows.text(Some(&flags.to_string())),
-            (Rows::Parquet(rows), false) => rows.number(value),
+            (RowSink::Csv(rows), true) => rows.words(flags.names()),
+            (RowSink::Csv(rows), false) => rows.number(value),
+            (RowSink::Parquet(rows), true) => rows.text(Some(&flags.to_string())),
+            (RowSink::Parquet(rows), false) => rows.number(value),
         }
     }
     Ok(match rows {
-        Rows::Csv(rows) => rows.end(),
-        Rows::Parquet(rows) => rows.end(),
+        RowSink::Csv(rows) => rows.end(),
+        RowSink::Parquet(rows) => rows.end(),
     }?)
 }
 

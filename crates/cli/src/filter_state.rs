@@ -6,7 +6,7 @@ use ohmstrain::{Stored, StoredClock};
 use ohmstrain_bench_data::{LastTime, Microseconds};
 
 use crate::error::CliError;
-use crate::stream::Rows;
+use crate::stream::RowSource;
 use crate::whole_file;
 
 /// Reads what `--save-state` wrote.
@@ -24,7 +24,7 @@ pub const fn of_last_time(last: LastTime) -> StoredClock {
 }
 
 /// Continues a stream from the end of the one before.
-pub fn go_on(rows: &mut Rows, stored: &Stored) -> Result<(), CliError> {
+pub fn go_on(rows: &mut RowSource, stored: &Stored) -> Result<(), CliError> {
     let (last, column) = match stored.clock {
         None => return Ok(()),
         Some(StoredClock::TimeS(time_s)) => (LastTime::Seconds(time_s), "time_s"),

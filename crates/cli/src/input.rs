@@ -213,6 +213,12 @@ impl TraceFile {
         value.copied().unwrap_or(f64::NAN)
     }
 
+    /// Returns time, reading and reference in a row.
+    pub fn known_row(&self, row: usize) -> (f64, Reading, f64) {
+        let (time_s, reading) = self.reading(row);
+        (time_s, reading, self.truth(row))
+    }
+
     /// Returns the quantity of its reference.
     pub fn quantity(&self) -> Option<Quantity> {
         self.trace.reference.as_ref().map(|reference| match reference.quantity {

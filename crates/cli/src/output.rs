@@ -16,8 +16,8 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 pub use kind::{IMPORT, Kind, MANUAL, SIMULATE, is_of_a_hand, is_this_program};
+pub use place::Destination;
 use place::Identity;
-pub use place::Place;
 pub use rows::RowsOut;
 use unfinished::Unfinished;
 pub use unfinished::UnfinishedFolder;
@@ -47,7 +47,7 @@ struct Claimed {
     kind: Kind,
     /// Columns of a table.
     columns: Vec<String>,
-    place: Place,
+    place: Destination,
     content: Option<Vec<u8>>,
     /// File that was written bit by bit.
     begun: Option<Unfinished>,
@@ -96,7 +96,7 @@ impl Outputs {
     /// As [`Outputs::claim`].
     pub fn claim_table(&mut self, path: &Path, kind: Kind, columns: &[String]) -> Result<Claim, CliError> {
         refuse_stdout(path)?;
-        let place = Place::of(path).map_err(|error| match path.parent() {
+        let place = Destination::of(path).map_err(|error| match path.parent() {
             Some(folder) if !folder.as_os_str().is_empty() && !folder.exists() => {
                 CliError::Other(format!("cannot write {}: there is no folder {}", path.display(), folder.display()))
             }
@@ -173,7 +173,7 @@ impl Outputs {
         }
         let mut whole = Vec::new();
         // A device may still fail; taking a place hardly does.
-        self.files.sort_by_key(|file| matches!(file.place, Place::Through(_)));
+        self.files.sort_by_key(|file| matches!(file.place, Destination::Through(_)));
         for file in &mut self.files {
             if let Some(content) = file.content.take() {
                 let begun = file.place.fill(&content);

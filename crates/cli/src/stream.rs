@@ -11,17 +11,17 @@ use crate::input;
 type Source = Box<dyn Read>;
 
 /// Rows of a recording or of a device.
-pub enum Rows {
+pub enum RowSource {
     Recording(Box<TraceReader<Source>>),
     Device(Box<DeviceReader<Source>>),
 }
 
 /// Opens what is to be filtered.
-pub fn open(args: &FilterArgs) -> Result<Rows, CliError> {
+pub fn open(args: &FilterArgs) -> Result<RowSource, CliError> {
     let (text, metadata) = input::text_of(&args.trace_file, &args.setup.metadata(&args.estimate.units))?;
     let name = args.trace_file.display().to_string();
-    let recording = |reader| Rows::Recording(Box::new(reader));
-    let device = |reader| Rows::Device(Box::new(reader));
+    let recording = |reader| RowSource::Recording(Box::new(reader));
+    let device = |reader| RowSource::Device(Box::new(reader));
     match (&args.header, args.skip_bad) {
         (None, false) => Ok(recording(TraceReader::with_overrides(text, &name, &metadata)?)),
         (None, true) => DeviceReader::new(text, &name, &metadata).map(device).map_err(without_header),
@@ -55,7 +55,7 @@ fn of_header_flag(error: TraceError) -> CliError {
     }
 }
 
-impl Rows {
+impl RowSource {
     /// Name of the source, as messages call it.
     pub fn file(&self) -> &str {
         match self {
@@ -105,7 +105,7 @@ impl Rows {
     }
 }
 
-impl Iterator for Rows {
+impl Iterator for RowSource {
     type Item = Result<DeviceRow, TraceError>;
 
     fn next(&mut self) -> Option<Self::Item> {

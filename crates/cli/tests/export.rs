@@ -54,6 +54,28 @@ pub fn compile_and_run(compiler: &str, folder: &Path, sources: &[&str], stdin: &
     run_program(&compile(compiler, folder, sources, "program.out"), stdin, &[])
 }
 
+/// C that earlier versions have exported is compiled by today's compilers, and passes its self-test.
+#[test]
+fn exported_c_of_released_versions_passes_its_self_test() {
+    let released = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/released"));
+    let folders = std::fs::read_dir(released).unwrap().map(|folder| folder.unwrap().path().join("c"));
+    let folders: Vec<PathBuf> = folders.filter(|folder| folder.exists()).collect();
+    assert!(!folders.is_empty());
+    for folder in folders {
+        for compiler in compilers() {
+            let bench = Bench::new();
+            for part in ["src", "selftest"] {
+                std::fs::create_dir(bench.path(part)).unwrap();
+            }
+            for file in ["src/ohmstrain.c", "src/ohmstrain.h", "selftest/selftest.c", "selftest/vectors.h"] {
+                bench.write(file, std::fs::read_to_string(folder.join(file)).unwrap());
+            }
+            let printed = compile_and_run(compiler, &bench.path("."), &["src/ohmstrain.c", "selftest/selftest.c"], "");
+            assert!(printed.ends_with("self-test passed\n"), "{printed}");
+        }
+    }
+}
+
 /// The lists for an AVR give the self-test's bits, and those of a recording that is unplugged for a while.
 #[test]
 fn lists_of_operations_compute_what_compiled_functions_do() {

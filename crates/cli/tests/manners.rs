@@ -2,8 +2,9 @@
 
 use crate::common::{Bench, SIMULATE, files_in};
 
-const COMMANDS: [&str; 19] = [
+const COMMANDS: [&str; 20] = [
     "demo",
+    "example",
     "inspect",
     "import",
     "plan",

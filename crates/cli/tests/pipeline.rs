@@ -49,6 +49,9 @@ fn the_demo_writes_five_whole_files_prints_its_table_and_does_the_same_twice() {
         assert_eq!(fs::read(first.path(&path)).unwrap(), fs::read(second.path(&path)).unwrap(), "{name}");
     }
 
+    // The example is its recording.
+    assert_eq!(first.run(&["example"]).ok(), first.read("demo/trace.csv"));
+
     let trace = Csv::new(&first.read("demo/trace.csv"));
     for name in ["demo/estimates.csv", "demo/smoothed.csv"] {
         let estimates = Csv::new(&first.read(name));

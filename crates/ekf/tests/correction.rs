@@ -2,8 +2,8 @@
 
 use ohmstrain_ekf::Gaussian;
 use ohmstrain_ekf::correction::{
-    BLOCK, Correction, FEATURES, FeatureScale, InputScale, LowPass, OneSided, Process, ReadingFeatures, RowBlock, Rows,
-    Simulated, Triangle, block_of, consensus, mixture, settled, stripes,
+    BLOCK, Correction, FEATURES, FeatureScale, InputRows, InputScale, LowPass, OneSided, Process, ReadingFeatures,
+    RowBlock, Simulated, Triangle, block_of, consensus, mixture, settled, stripes,
 };
 use ohmstrain_model::StrainRange;
 
@@ -128,7 +128,7 @@ macro_rules! correction {
                 least_variance: LEAST[p] as $t,
             };
         let $correction = Correction {
-            rows: Rows::new(&$rows, ROWS),
+            rows: InputRows::new(&$rows, ROWS),
             scales: &$scales,
             direct: process(0),
             one_sided: $sides.map(|p: usize| OneSided { process: process(p), first: sees(p)[0] }),
@@ -142,14 +142,14 @@ macro_rules! correction {
 }
 
 /// A mixture by its moments.
-fn mixed(voices: &[Gaussian<f64>]) -> Gaussian<f64> {
-    let weights: Vec<f64> = voices.iter().map(|voice| voice.variance.powf(-1.5)).collect();
+fn mixed(members: &[Gaussian<f64>]) -> Gaussian<f64> {
+    let weights: Vec<f64> = members.iter().map(|member| member.variance.powf(-1.5)).collect();
     let moment = |of: &dyn Fn(&Gaussian<f64>) -> f64| {
-        let weighted = voices.iter().zip(&weights).map(|(voice, weight)| weight * of(voice));
+        let weighted = members.iter().zip(&weights).map(|(member, weight)| weight * of(member));
         weighted.sum::<f64>() / weights.iter().sum::<f64>()
     };
-    let mean = moment(&|voice| voice.mean);
-    Gaussian { mean, variance: moment(&|voice| voice.variance + voice.mean.powi(2)) - mean * mean }
+    let mean = moment(&|member| member.mean);
+    Gaussian { mean, variance: moment(&|member| member.variance + member.mean.powi(2)) - mean * mean }
 }
 
 #[test]
@@ -161,21 +161,21 @@ fn all_processes_their_mixture_and_novelty() {
         let input: [f64; D] = std::array::from_fn(|i| 3.0 * number(1000 + 10 * trial + i));
         let filtered = Gaussian { mean: input[0], variance: 0.05 * (1.0 + number(9000 + trial)) };
         let said = correction.correct(&input, filtered, 1.0);
-        let (voices, novelty) = written_out(&numbers, &input, filtered);
+        let (members, novelty) = written_out(&numbers, &input, filtered);
         // Tens of sums of products of numbers of order one.
         let close = |a: f64, b: f64| (a - b).abs() < 1e-12 * (1.0 + b.abs());
         let same = |a: Gaussian<f64>, b: Gaussian<f64>| close(a.mean, b.mean) && close(a.variance, b.variance);
         let [past, future] = said.one_sided;
         let expected = [said.direct, said.residual, past, future];
-        assert!(voices.into_iter().zip(expected).all(|(a, b)| same(b, a)), "{trial}: {said:?}");
+        assert!(members.into_iter().zip(expected).all(|(a, b)| same(b, a)), "{trial}: {said:?}");
         assert!(close(said.novelty, novelty), "{trial}");
         let doubted = [0, 1, 2, 3].map(|p| {
-            let others: Vec<Gaussian<f64>> = (0..4).filter(|other| *other != p).map(|other| voices[other]).collect();
-            let (others, own) = (mixed(&others), voices[p]);
+            let others: Vec<Gaussian<f64>> = (0..4).filter(|other| *other != p).map(|other| members[other]).collect();
+            let (others, own) = (mixed(&others), members[p]);
             let unexplained = (own.mean - others.mean).powi(2) - own.variance - others.variance;
             Gaussian { mean: own.mean, variance: own.variance + unexplained.max(0.0) }
         });
-        contradicted += usize::from(doubted != voices);
+        contradicted += usize::from(doubted != members);
         let Gaussian { mean, variance } = mixed(&doubted);
         let variance = 0.6 * variance + 0.06 * 0.7 * novelty;
         assert!(close(said.strain.mean, mean) && (said.strain.variance - variance).abs() < 1e-11, "{trial}");
@@ -200,8 +200,10 @@ fn simulated_rows_are_mixed_in_last() {
         widening: 1.0,
         least_variance: 0.0,
     };
-    let with =
-        Correction { simulated: Some(Simulated { rows: Rows::new(&rows, ROWS), scales: &wider, process }), ..learned };
+    let with = Correction {
+        simulated: Some(Simulated { rows: InputRows::new(&rows, ROWS), scales: &wider, process }),
+        ..learned
+    };
     for trial in 0..50 {
         let input: [f64; D] = std::array::from_fn(|i| 3.0 * number(3000 + 10 * trial + i));
         let filtered = Gaussian { mean: input[0], variance: 0.05 };

@@ -35,9 +35,10 @@ fn filter() -> Filter {
         per_reading: 0.66,
         start: 1e-3,
         most: unread.anywhere,
-        session: 0.0,
+        unstated: 0.0,
         unread,
         rest: None,
+        turns: None,
     };
     let parts = LiveParts {
         rest_reading: REST_READING,

@@ -8,7 +8,7 @@ use super::ExportError;
 use super::boards::Board;
 use super::cost::{Cost, Processor, cost_of};
 use super::plan::{ChipFilter, Plan};
-use super::reduced::Rows;
+use super::reduced::RowBudget;
 
 /// Largest cost of a filter, on a Cortex-M4F or on a board.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -132,7 +132,7 @@ pub struct Candidate {
 #[derive(Clone, Copy)]
 enum Left {
     All,
-    Some(Rows),
+    Some(RowBudget),
     None,
 }
 
@@ -160,7 +160,7 @@ const ORDER: [(usize, Left); 18] = [
 ];
 
 const fn rows(mean: usize, variance: usize) -> Left {
-    Left::Some(Rows { mean, variance })
+    Left::Some(RowBudget { mean, variance })
 }
 
 /// Plans of a sensor's default, the best by the table first, and whether they fit.

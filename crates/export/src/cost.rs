@@ -249,8 +249,8 @@ fn state(branches: usize, chip: &ChipFilter) -> usize {
         EstimatorKind::Hypotheses => filter.hypotheses * (gaussian + 3) + 1,
         _ => gaussian,
     };
-    // Readings and doubts: twenty-four words; of a correction four, low-passes and features. A pause; strain, rate, their variances;
+    // Readings and doubts: twenty-nine words; of a correction four, low-passes and features. A pause; strain, rate, their variances;
     // rest reading.
     let correction = filter.correction.as_ref().map_or(0, |_| 4 + TIME_CONSTANTS_S.len() + FEATURES);
-    FLOAT * (words + 24 + correction + 7)
+    FLOAT * (words + 29 + correction + 7)
 }

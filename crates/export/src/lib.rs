@@ -41,7 +41,7 @@ pub use pace::usual_step_s;
 pub use plan::{ChipFilter, Plan};
 pub use prefix::Prefix;
 pub use promise::{Compared, Promise};
-pub use replay::{ReplayedRow, Said, replay};
+pub use replay::{ChipEstimate, ReplayedRow, replay};
 
 /// A language that sensors are exported to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

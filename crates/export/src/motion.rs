@@ -15,7 +15,7 @@ const MISSING: [std::ops::Range<usize>; 2] = [60..61, 170..175];
 const NOISY: std::ops::Range<usize> = 120..130;
 
 /// One row.
-pub struct Row {
+pub struct MotionRow {
     /// R/R₀ - 1; `None` if it is missing.
     pub rho: Option<f64>,
     /// Standard deviation that the reading brings along, relative to R₀.
@@ -23,7 +23,7 @@ pub struct Row {
 }
 
 /// The rows of the motion, with white noise of `reading_sd` from a seed.
-pub fn rows<const B: usize>(law: &SensorLaw<f64, B>, dt_s: f64, reading_sd: f64, seed: u64) -> Vec<Row> {
+pub fn rows<const B: usize>(law: &SensorLaw<f64, B>, dt_s: f64, reading_sd: f64, seed: u64) -> Vec<MotionRow> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut relaxation = [0.0; B];
     let mut rows = Vec::new();
@@ -50,7 +50,7 @@ pub fn rows<const B: usize>(law: &SensorLaw<f64, B>, dt_s: f64, reading_sd: f64,
             let rho = law.relative_change(strain, rate, &relaxation, 0.0, phase) + (reading_sd + extra_sd) * noise;
             // Noise can be large enough to make a resistance negative.
             let rho = (!MISSING.iter().any(|gap| gap.contains(&row))).then_some(rho.max(-0.99));
-            rows.push(Row { rho, extra_sd });
+            rows.push(MotionRow { rho, extra_sd });
         }
     }
     rows

@@ -3,7 +3,7 @@
 use ohmstrain_sensor::{EstimatorKind, HYPOTHESES, PortableFilter, SensorParams};
 
 use super::quadratic::OwnedQuadratic;
-use super::reduced::{Rows, reduced};
+use super::reduced::{RowBudget, reduced};
 use super::{ExportError, parameter};
 
 /// Parts of a filter that are exported.
@@ -14,7 +14,7 @@ pub struct Plan {
     /// Number of hypotheses to keep; as many as on a computer if `None`.
     pub hypotheses: Option<usize>,
     /// Part of the correction to keep; all of it if `None`.
-    pub rows: Option<Rows>,
+    pub rows: Option<RowBudget>,
 }
 
 /// A filter as it goes onto a chip.

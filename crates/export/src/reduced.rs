@@ -54,7 +54,7 @@ impl Which {
 
 /// Number of rows of a correction that are left.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Rows {
+pub struct RowBudget {
     /// Rows for its means, beside a quadratic function.
     pub mean: usize,
     /// Rows for its variances.
@@ -62,10 +62,10 @@ pub struct Rows {
 }
 
 /// The correction with no more than these rows, and what stands for the others; none if kernels are singular.
-pub fn reduced(full: &Correction, to: Rows) -> Option<(Correction, [OwnedQuadratic; 2])> {
+pub fn reduced(full: &Correction, to: RowBudget) -> Option<(Correction, [OwnedQuadratic; 2])> {
     let inducing = full.direct.explained.side().min(full.residual.explained.side());
     let rows = to.mean.max(to.variance).min(inducing).max(1);
-    let to = Rows { mean: rows, variance: to.variance.clamp(1, rows) };
+    let to = RowBudget { mean: rows, variance: to.variance.clamp(1, rows) };
     let points = points(&full.rows);
     let (direct, of_direct) = process(&full.direct, Which::Direct, &full.rows, &points, to)?;
     let (residual, of_residual) = process(&full.residual, Which::Residual, &full.rows, &points, to)?;
@@ -78,7 +78,7 @@ fn process(
     which: Which,
     rows: &[Row],
     points: &[(Row, f64)],
-    to: Rows,
+    to: RowBudget,
 ) -> Option<(Process, OwnedQuadratic)> {
     let at: Vec<&[f64]> = points.iter().map(|(row, _)| which.inputs(row)).collect();
     let weights: Vec<f64> = points.iter().map(|(_, weight)| *weight).collect();

@@ -21,7 +21,7 @@ pub struct ReplayedRow {
 
 /// A row as the exported program in single precision reports it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Said<T = f32> {
+pub struct ChipEstimate<T = f32> {
     /// Strain.
     pub strain: T,
     /// Its deviation.
@@ -34,7 +34,12 @@ pub struct Said<T = f32> {
 ///
 /// # Errors
 /// See [`ExportError`].
-pub fn replay(params: &SensorParams, plan: &Plan, dt_s: f64, rows: &[ReplayedRow]) -> Result<Vec<Said>, ExportError> {
+pub fn replay(
+    params: &SensorParams,
+    plan: &Plan,
+    dt_s: f64,
+    rows: &[ReplayedRow],
+) -> Result<Vec<ChipEstimate>, ExportError> {
     let filter = ChipFilter::new(params, plan)?;
     with_sizes!(params.law.branches.len(), B, N, L => of::<B, N, L>(params, &filter, dt_s, rows))
         .unwrap_or_else(|| Err(too_many_branches()))
@@ -45,7 +50,7 @@ fn of<const B: usize, const N: usize, const L: usize>(
     filter: &ChipFilter,
     dt_s: f64,
     rows: &[ReplayedRow],
-) -> Result<Vec<Said>, ExportError> {
+) -> Result<Vec<ChipEstimate>, ExportError> {
     let sensor = FixedRate::<B, N>::new::<L>(params, filter, dt_s as f32)?;
     let replay = Replay { rows, protections: Protections::ALL };
     with_twin::<_, B, N, L, _>(&sensor, sensor.model, sensor.interpolated(), replay)
@@ -57,20 +62,23 @@ struct Replay<'a> {
 }
 
 impl<T: Real> Task<T> for Replay<'_> {
-    type Said = Vec<Said<T>>;
+    type Output = Vec<ChipEstimate<T>>;
 
-    fn run<F, const N: usize, const L: usize>(self, live: TwinFilter<'_, T, F, N, L>) -> Result<Vec<Said<T>>, StepError>
+    fn run<F, const N: usize, const L: usize>(
+        self,
+        live: TwinFilter<'_, T, F, N, L>,
+    ) -> Result<Vec<ChipEstimate<T>>, StepError>
     where
         F: SensorEstimator<T, N, L, Prepared = F> + StepNumbers<T>,
     {
         let mut live = live.protected_by(self.protections);
-        let said = |row: &ReplayedRow| {
+        let estimate = |row: &ReplayedRow| {
             let [reading, sd] = [row.reading, row.reading_sd].map(|number| T::of(f64::from(number as f32)));
             let reading = (!row.reading.is_nan()).then(|| live.relative(reading, sd));
             let LiveEstimate { strain, flags, .. } = live.step_after(T::of(row.since_s.into()), reading)?;
-            Ok(Said { strain: strain.mean, sd: strain.sd(), flags: bits(flags) })
+            Ok(ChipEstimate { strain: strain.mean, sd: strain.sd(), flags: bits(flags) })
         };
-        self.rows.iter().map(said).collect()
+        self.rows.iter().map(estimate).collect()
     }
 }
 

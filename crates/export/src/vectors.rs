@@ -90,12 +90,16 @@ impl Run {
     ) -> Result<Self, ExportError> {
         let inputs = readings(sensor, seed);
         let single = |inputs: &[Input]| {
-            let motion = Motion { sensor, inputs };
+            let motion = MotionRun { sensor, inputs };
             with_twin::<_, B, N, L, _>(sensor, sensor.model, sensor.interpolated(), motion)
         };
         let (estimates, work): (Vec<(f32, f32)>, Work) = single(&inputs)?;
-        let (exact, _): (Vec<(f64, f64)>, Work) =
-            with_twin::<_, B, N, L, _>(sensor, sensor.reference, sensor.exact(), Motion { sensor, inputs: &inputs })?;
+        let (exact, _): (Vec<(f64, f64)>, Work) = with_twin::<_, B, N, L, _>(
+            sensor,
+            sensor.reference,
+            sensor.exact(),
+            MotionRun { sensor, inputs: &inputs },
+        )?;
         let mut rounding = farthest(&estimates, exact.into_iter());
         // The distance from exact arithmetic may be small by chance.
         let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -166,7 +170,7 @@ impl Vectors {
 /// Work of a step of the motion.
 pub fn work<const B: usize, const N: usize, const L: usize>(sensor: &FixedRate<'_, B, N>) -> Result<Work, ExportError> {
     let inputs = readings(sensor, FIRST_SEED);
-    let motion = Motion { sensor, inputs: &inputs };
+    let motion = MotionRun { sensor, inputs: &inputs };
     let (_, work): (Vec<(f32, f32)>, Work) =
         with_twin::<_, B, N, L, _>(sensor, sensor.model, sensor.interpolated(), motion)?;
     Ok(work)
@@ -175,7 +179,7 @@ pub fn work<const B: usize, const N: usize, const L: usize>(sensor: &FixedRate<'
 /// The readings of the motion, in the sensor's unit.
 fn readings<const B: usize, const N: usize>(sensor: &FixedRate<'_, B, N>, seed: u64) -> Vec<Input> {
     let rest = sensor.parts.live.rest_reading;
-    let input = |row: motion::Row| Input {
+    let input = |row: motion::MotionRow| Input {
         reading: row.rho.map(|rho| (rest * (1.0 + rho)) as f32),
         reading_sd: (rest * row.extra_sd) as f32,
     };
@@ -203,18 +207,18 @@ fn relative<T: Real>(rest_reading: f32, input: &Input) -> Option<Reading<T>> {
 }
 
 /// Strain and deviation as they are reported, row by row; the work of a step.
-struct Motion<'a, const B: usize, const N: usize> {
+struct MotionRun<'a, const B: usize, const N: usize> {
     sensor: &'a FixedRate<'a, B, N>,
     inputs: &'a [Input],
 }
 
-impl<T: Real, const B: usize, const S: usize> Task<T> for Motion<'_, B, S> {
-    type Said = (Vec<(T, T)>, Work);
+impl<T: Real, const B: usize, const S: usize> Task<T> for MotionRun<'_, B, S> {
+    type Output = (Vec<(T, T)>, Work);
 
     fn run<F, const N: usize, const L: usize>(
         self,
         mut live: TwinFilter<'_, T, F, N, L>,
-    ) -> Result<Self::Said, StepError>
+    ) -> Result<Self::Output, StepError>
     where
         F: SensorEstimator<T, N, L, Prepared = F> + StepNumbers<T>,
     {

@@ -338,7 +338,7 @@ impl<'a> FilterBuilder<'a> {
     pub(crate) fn smoothers_doubts(self, kind: EstimatorKind) -> Result<Option<Doubts<f64>>, Error> {
         let params = self.sensor.params();
         let motion = &params.estimator(params.filter_of(kind)).map_err(SensorError::from)?.motion;
-        let doubts = self.protections.doubts.then(|| Doubts::new(params.doubt_parts(motion)));
+        let doubts = self.protections.doubts.then(|| Doubts::new(params.smoothers_doubts(motion)));
         let of_known = |doubts: Doubts<f64>, strain| doubts.of_known_strain(self.is_at_rest(strain));
         Ok(doubts.map(|doubts| self.initial_strain.map_or(doubts, |strain| of_known(doubts, strain))))
     }

@@ -34,9 +34,9 @@ impl RowWriter {
     }
 
     /// Returns the row of an output, corrected by known errors.
-    fn known_row(&self, (time_s, reading): (f64, Reading), said: &Output) -> Estimate {
-        let mut output = *said;
-        output.estimate.strain = self.errors.correct(time_s, said.estimate.strain);
+    fn known_row(&self, (time_s, reading): (f64, Reading), stated: &Output) -> Estimate {
+        let mut output = *stated;
+        output.estimate.strain = self.errors.correct(time_s, stated.estimate.strain);
         self.scale.row(time_s, reading, &output)
     }
 }
@@ -55,17 +55,17 @@ impl Kernel {
         Ok(StoredKernel {
             rest_reading: self.rows.scale.rest_reading,
             known: self.known.iter().copied().map(Ahead::from).collect(),
-            told: self.rows.errors.strains().copied().collect(),
+            strains: self.rows.errors.strains().copied().collect(),
             filter: self.filter.store()?,
         })
     }
 
     /// Resumes from a stored state; known strains of both are kept.
     fn resume(&mut self, stored: StoredKernel) -> Result<(), Error> {
-        let StoredKernel { rest_reading, known, told, filter } = stored;
+        let StoredKernel { rest_reading, known, strains, filter } = stored;
         self.filter.resume(filter).map_err(|error| StoredError::Content(Box::new(error)))?;
         self.rows.scale.rest_reading = rest_reading;
-        self.rows.errors = KnownErrors::of(self.rows.scale.limits(), &told);
+        self.rows.errors = KnownErrors::of(self.rows.scale.limits(), &strains);
         self.known.extend(known.into_iter().map(Ahead::strain));
         self.known.make_contiguous().sort_by(|a, b| a.0.total_cmp(&b.0));
         Ok(())
@@ -119,13 +119,13 @@ impl Filter {
     pub fn step(&mut self, time_s: f64, reading: impl Into<Reading>) -> Result<Estimate, Error> {
         let (kernel, reading) = (&mut self.kernel, reading.into());
         kernel.filter.step(time_s, reading.relative(kernel.rows.scale.rest_reading))?;
-        let said = kernel.filter.output();
-        let mut row = kernel.rows.row((time_s, reading), &said);
+        let output = kernel.filter.output();
+        let mut row = kernel.rows.row((time_s, reading), &output);
         while let Some(known) = next_until(&mut kernel.known, time_s) {
-            kernel.know(KnownStrain { time_s, known, said: said.estimate.strain });
-            row = kernel.rows.known_row((time_s, reading), &said);
+            kernel.know(KnownStrain { time_s, known, estimated: output.estimate.strain });
+            row = kernel.rows.known_row((time_s, reading), &output);
         }
-        self.last = Some((time_s, reading, said));
+        self.last = Some((time_s, reading, output));
         Ok(row)
     }
 
@@ -148,12 +148,12 @@ impl Filter {
     pub fn know(&mut self, strain: f64, sd: f64) -> Result<Estimate, Error> {
         let kernel = &mut self.kernel;
         let known = kernel.rows.scale.known(strain, sd)?;
-        let Some((time_s, reading, said)) = self.last else {
+        let Some((time_s, reading, output)) = self.last else {
             kernel.known.push_front((f64::NEG_INFINITY, known));
             return Ok(kernel.rows.scale.row(f64::NAN, Reading::MISSING, &kernel.filter.output()));
         };
-        kernel.know(KnownStrain { time_s, known, said: said.estimate.strain });
-        Ok(kernel.rows.known_row((time_s, reading), &said))
+        kernel.know(KnownStrain { time_s, known, estimated: output.estimate.strain });
+        Ok(kernel.rows.known_row((time_s, reading), &output))
     }
 
     /// Stores all that the next row depends on: [`FilterBuilder::resume`](crate::FilterBuilder::resume) resumes from it, to the bit.
@@ -174,7 +174,7 @@ impl Filter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn store(&self) -> Result<Stored, Error> {
-        let last = self.last.map(|(time_s, reading, said)| Last { time_s, reading, said });
+        let last = self.last.map(|(time_s, reading, output)| Last { time_s, reading, output });
         Ok(Stored::new(&self.kernel.made_of, None, last, Vec::new(), self.kernel.store()?))
     }
 
@@ -186,7 +186,7 @@ impl Filter {
     pub(crate) fn resume(&mut self, stored: &Stored) -> Result<(), Error> {
         stored.check(&self.kernel.made_of, None)?;
         self.kernel.resume(stored.kernel.clone())?;
-        self.last = stored.last.map(|Last { time_s, reading, said }| (time_s, reading, said));
+        self.last = stored.last.map(|Last { time_s, reading, output }| (time_s, reading, output));
         Ok(())
     }
 
@@ -358,8 +358,8 @@ impl LaggedFilter {
     fn take_known(&mut self) {
         let Some(time_s) = self.last_s else { return };
         while let Some(known) = next_until(&mut self.kernel.known, time_s) {
-            let said = self.kernel.filter.strain();
-            self.kernel.know(KnownStrain { time_s, known, said });
+            let estimated = self.kernel.filter.strain();
+            self.kernel.know(KnownStrain { time_s, known, estimated });
         }
     }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use ohmstrain_calib::{FusionChannel, Samples, fit_fusion};
 use ohmstrain_model::Joint;
 use ohmstrain_sensor::Quantity;
-use ohmstrain_sensor::fusion::{ChannelState, FUSION_FORMAT, Fusion, FusionParams, Voice};
+use ohmstrain_sensor::fusion::{ChannelState, FUSION_FORMAT, Fusion, FusionParams, Member};
 
 use crate::text::{self, Document};
 #[cfg(feature = "calibrate")]
@@ -176,7 +176,7 @@ fn state(filter: &Filter, row: &Estimate) -> ChannelState {
     let reading = row.resistance.filter(|reading| is_read && *reading > 0.0);
     ChannelState {
         ln_r: reading.map_or(f64::NAN, |reading| (reading / filter.rest_reading()).ln()),
-        own: Voice { strain: row.strain, sd: row.strain_sd },
+        own: Member { strain: row.strain, sd: row.strain_sd },
     }
 }
 

@@ -60,6 +60,8 @@ mod sensor;
 mod sentences;
 mod smoothing;
 mod stored;
+#[cfg(feature = "calibrate")]
+mod tested;
 mod text;
 mod unit_doubt;
 mod validity;
@@ -100,6 +102,8 @@ pub use sensor::Sensor;
 pub use sentences::LagAnswer;
 pub use sentences::{Closing, Interface, Tested, number, verdict};
 pub use stored::{Stored, StoredClock, StoredError};
+#[cfg(feature = "calibrate")]
+pub use tested::Kept;
 pub use unit_doubt::{UnitDoubt, UnitGuess};
 pub use validity::{Beyond, Extrapolation, ValiditySeen, ValidityWatch};
 

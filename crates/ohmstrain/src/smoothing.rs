@@ -66,7 +66,7 @@ impl FilterBuilder<'_> {
         take: impl FnMut(Range<usize>, &[Estimate]) -> Result<(), E>,
     ) -> Result<(), E> {
         let mut known = self.known_of_all(len, &row)?;
-        self.smooth_with(len, row, |_, time_s, said| known.correct(time_s, said), take)
+        self.smooth_with(len, row, |_, time_s, estimated| known.correct(time_s, estimated), take)
     }
 
     /// Computes the errors at known strains for all rows of a recording. The recording is smoothed once for the estimates there.
@@ -78,15 +78,18 @@ impl FilterBuilder<'_> {
         while k < len && !due.is_empty() {
             let time_s = row(k).0;
             while let Some(strain) = next_until(&mut due, time_s) {
-                known.push((k, KnownStrain { time_s, known: strain, said: strain }));
+                known.push((k, KnownStrain { time_s, known: strain, estimated: strain }));
             }
             k += 1;
         }
         if !known.is_empty() {
-            let listen = |k: usize, _: f64, said: Gaussian<f64>| {
+            let listen = |k: usize, _: f64, estimated: Gaussian<f64>| {
                 let first = known.partition_point(|known| known.0 < k);
-                known[first..].iter_mut().take_while(|known| known.0 == k).for_each(|known| known.1.said = said);
-                said
+                known[first..]
+                    .iter_mut()
+                    .take_while(|known| known.0 == k)
+                    .for_each(|known| known.1.estimated = estimated);
+                estimated
             };
             self.smooth_with(len, row, listen, |_, _| Ok::<(), Error>(()))?;
         }
@@ -138,9 +141,10 @@ impl FilterBuilder<'_> {
                     let taken = output.verdict.is_taken().then(|| (calibrated(k).1, output.nis));
                     let of_session = |reading| follower.map_or(reading, |follower| follower.of_session(reading));
                     let taken = taken.and_then(|(reading, nis)| Some((of_session(reading?.value), nis.unwrap_or(0.0))));
-                    doubts.see_back(time_s - start_s, next_s - time_s, taken);
+                    let unturned_s = back.turns().around(time_s);
+                    doubts.see_back(time_s - start_s, next_s - time_s, unturned_s, taken);
                     next_s = if taken.is_some() { time_s } else { next_s };
-                    let (widened, flags) = doubts.widened(estimate.rate.mean, estimate.strain.variance);
+                    let (widened, flags) = doubts.widened(estimate.strain, estimate.rate.mean);
                     output.widen(doubts, output.estimate.strain, widened);
                     output.doubts = flags;
                 }

@@ -12,7 +12,7 @@ use thiserror::Error;
 use crate::{Error, MADE_BY, QuietSeen, Reading, ValiditySeen};
 
 /// Version of the state file's format.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
 /// A running filter between two rows: the content of a state file. [`Filter::store`](crate::Filter::store) makes it.
 ///
@@ -124,7 +124,7 @@ pub(crate) struct StoredOptions {
 pub(crate) struct Last {
     pub time_s: f64,
     pub reading: Reading,
-    pub said: Output,
+    pub output: Output,
 }
 
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
@@ -149,7 +149,7 @@ pub(crate) struct StoredKernel {
     #[serde(default)]
     pub known: Vec<Ahead>,
     #[serde(default)]
-    pub told: Vec<KnownStrain>,
+    pub strains: Vec<KnownStrain>,
     pub filter: toml::Table,
 }
 
@@ -262,7 +262,7 @@ impl Stored {
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
     /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
-    /// assert!(sensor.filter().build()?.store()?.to_toml()?.starts_with("format = 1"));
+    /// assert!(sensor.filter().build()?.store()?.to_toml()?.starts_with("format = 2"));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn to_toml(&self) -> Result<String, Error> {

@@ -5,7 +5,10 @@ use ohmstrain_calib::{CorrectionOfFormat8, PRIOR_FORMAT, Prior};
 use ohmstrain_sensor::{FORMAT, FieldError, SensorParams};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
-use toml::de::{DeArray, DeTable};
+use toml::Spanned;
+#[cfg(feature = "calibrate")]
+use toml::de::ValueDeserializer;
+use toml::de::{DeArray, DeTable, Deserializer};
 
 use crate::error::{Place, TextCause, TextError};
 
@@ -23,8 +26,8 @@ pub(crate) trait Document: DeserializeOwned {
     /// Names the first number that is out of its range.
     fn check(&self) -> Result<(), FieldError>;
 
-    /// Converts a text of an older version; `None` if it cannot be converted.
-    fn converted(_text: &str, _format: u32) -> Option<Result<Self, toml::de::Error>> {
+    /// Converts a document of an older version; `None` if it cannot be converted.
+    fn converted(_document: Spanned<DeTable<'_>>, _format: u32) -> Option<Result<Self, toml::de::Error>> {
         None
     }
 }
@@ -37,18 +40,18 @@ impl Document for SensorParams {
     }
 
     #[cfg(feature = "calibrate")]
-    fn converted(text: &str, format: u32) -> Option<Result<Self, toml::de::Error>> {
-        (format == 8).then(|| of_format_8(text))
+    fn converted(document: Spanned<DeTable<'_>>, format: u32) -> Option<Result<Self, toml::de::Error>> {
+        (format == 8).then(|| of_format_8(document))
     }
 }
 
-/// Converts a text of format 8, which has no weights of the correction: they are learned now.
+/// Converts a document of format 8, which has no weights of the correction: they are learned now.
 #[cfg(feature = "calibrate")]
-fn of_format_8(text: &str) -> Result<SensorParams, toml::de::Error> {
-    let mut table: toml::Table = toml::from_str(text)?;
-    let correction: Option<CorrectionOfFormat8> = table.remove("correction").map(toml::Value::try_into).transpose()?;
-    table.insert("format".into(), FORMAT.into());
-    let mut params: SensorParams = table.try_into()?;
+fn of_format_8(mut document: Spanned<DeTable<'_>>) -> Result<SensorParams, toml::de::Error> {
+    let correction = document.get_mut().remove("correction").map(ValueDeserializer::from);
+    let correction = correction.map(CorrectionOfFormat8::deserialize).transpose()?;
+    let mut params = SensorParams::deserialize(Deserializer::from(document))?;
+    params.format = FORMAT;
     if let Some(correction) = correction {
         let nothing = || serde::de::Error::custom("`correction`: nothing can be learned from its rows");
         params.correction = Some(correction.learned(params.limits).ok_or_else(nothing)?);
@@ -71,18 +74,30 @@ pub(crate) fn parse<D: Document>(text: &str) -> Result<D, TextError> {
         place: error.span().map(|span| position(text, span.start)),
         cause: TextCause::Toml(error),
     };
-    let Version { format } = toml::from_str(text).map_err(no_toml)?;
-    let converted = if format == D::FORMAT { None } else { D::converted(text, format) };
-    if format != D::FORMAT && converted.is_none() {
-        let line = text.lines().position(|line| line.trim_start().starts_with("format")).map_or(1, |line| line + 1);
-        let place = Some(Place { line, column: None });
-        return Err(TextError { place, cause: TextCause::Format { expected: D::FORMAT, found: format } });
-    }
-    let params: D = converted.unwrap_or_else(|| toml::from_str(text)).map_err(no_toml)?;
+    let document = DeTable::parse(text).map_err(no_toml)?;
+    let format = format_of(&document, text).map_err(no_toml)?;
+    let params = if format == D::FORMAT {
+        D::deserialize(Deserializer::from(document))
+    } else {
+        D::converted(document, format).ok_or_else(|| {
+            let line = text.lines().position(|line| line.trim_start().starts_with("format")).map_or(1, |line| line + 1);
+            let place = Some(Place { line, column: None });
+            TextError { place, cause: TextCause::Format { expected: D::FORMAT, found: format } }
+        })?
+    };
+    let params = params.map_err(no_toml)?;
     match params.check() {
         Ok(()) => Ok(params),
         Err(error) => Err(TextError { place: place_of(text, &error.field), cause: TextCause::Field(error) }),
     }
+}
+
+/// The version of a document.
+fn format_of(document: &Spanned<DeTable<'_>>, text: &str) -> Result<u32, toml::de::Error> {
+    let number = document.get_ref().get("format").and_then(|value| value.get_ref().as_integer());
+    let known = number.and_then(|number| u32::from_str_radix(number.as_str(), number.radix()).ok());
+    // The error of a document without one.
+    known.map_or_else(|| toml::from_str::<Version>(text).map(|version| version.format), Ok)
 }
 
 /// Returns the place of a field such as `law.branches[0].tau_s`, or of the nearest table above it that the text has.

@@ -11,12 +11,12 @@ use crate::column::reading_column;
 /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
 /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
 /// let mut watch = ohmstrain::ValidityWatch::new(&sensor, None);
-/// let said: Vec<String> = (0..20)
+/// let messages: Vec<String> = (0..20)
 ///     .flat_map(|second| watch.see(f64::from(second), 3900.0, 0.0, f64::NAN))
 ///     .map(|beyond| beyond.to_string())
 ///     .collect();
 /// let expected = "at 10 s: resistance_ohm is outside of the calibration's 1598.9 to 3703.1";
-/// assert!(said[0].starts_with(expected), "{}", said[0]);
+/// assert!(messages[0].starts_with(expected), "{}", messages[0]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
@@ -99,7 +99,7 @@ pub enum Beyond {
 struct Outside {
     rows: usize,
     outside: usize,
-    said: bool,
+    reported: bool,
 }
 
 /// Rows outside are a matter of chance up to this number and this share.
@@ -141,8 +141,8 @@ impl Outside {
         self.rows += 1;
         self.outside += usize::from(outside);
         let many = self.outside > chance.0 && self.outside as f64 > chance.1 * self.rows as f64;
-        let now = many && !self.said;
-        self.said |= now;
+        let now = many && !self.reported;
+        self.reported |= now;
         now
     }
 }
@@ -250,7 +250,7 @@ impl ValidityWatch {
             (is_beyond, Beyond::Strain { quantity, least: lower, most: upper }),
         ];
         // Mostly there is nothing to say.
-        let said = (is_long || is_fast || is_other || is_beyond).then_some(all);
-        said.into_iter().flatten().filter_map(move |(now, beyond)| now.then_some(Extrapolation { time_s, beyond }))
+        let found = (is_long || is_fast || is_other || is_beyond).then_some(all);
+        found.into_iter().flatten().filter_map(move |(now, beyond)| now.then_some(Extrapolation { time_s, beyond }))
     }
 }

@@ -7,7 +7,7 @@ mod empty_rows;
 mod known;
 mod lag;
 mod motion_doubts;
-mod older_formats;
+mod released;
 mod resumed;
 mod rows;
 mod surprises;

@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use pyo3_arrow::PyTable;
 
 use crate::about::About;
-use crate::doubts::{called, heard, on_one_clock};
+use crate::doubts::{called, on_one_clock, raised_or_warned};
 use crate::error::{Place, Stopped, heed, of_library, raise};
 use crate::evaluation::{Scored, after_split};
 use crate::options::estimator;
@@ -127,11 +127,11 @@ fn run(
     let samples = samples.collect::<Result<Vec<_>, _>>().map_err(Error::from)?;
     let as_read = recordings.iter().zip(&samples).map(|(recording, samples)| recording.known(samples));
     let as_read = as_read.collect::<Result<Vec<_>, _>>()?;
-    let mut warnings = heard(recordings, &motion_doubts(&as_read)).map_err(Stopped::Interrupted)?;
+    let mut warnings = raised_or_warned(recordings, &motion_doubts(&as_read)).map_err(Stopped::Interrupted)?;
     let screened = screen(&samples).map_err(Error::from)?;
     let known = recordings.iter().zip(screened.samples()).map(|(recording, samples)| recording.known(&samples));
     let known = known.collect::<Result<Vec<_>, _>>()?;
-    warnings.extend(heard(recordings, &calibration_doubts(&known)).map_err(Stopped::Interrupted)?);
+    warnings.extend(raised_or_warned(recordings, &calibration_doubts(&known)).map_err(Stopped::Interrupted)?);
     let left_out = screened.distrusted.iter().map(|one| {
         let name = called(recordings, one.recording);
         format!("{name}: row {} ({} s): {}; left out of the calibration", one.row, one.time_s, one.doubt)
@@ -139,7 +139,7 @@ fn run(
     warnings.extend(left_out);
     let interrupted = |error: PyErr| resume_unwind(Box::new(error));
     let calibrated = calibration.run_with(&known, |_| heed().unwrap_or_else(interrupted))?;
-    warnings.extend(heard(recordings, &calibrated.doubts()).map_err(Stopped::Interrupted)?);
+    warnings.extend(raised_or_warned(recordings, &calibrated.doubts()).map_err(Stopped::Interrupted)?);
     Ok((calibrated, warnings))
 }
 

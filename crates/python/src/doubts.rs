@@ -14,7 +14,7 @@ pub fn called(recordings: &[Recording], place: usize) -> String {
 }
 
 /// Warnings of doubts about a calibration; the first one that has to be answered is raised.
-pub fn heard(recordings: &[Recording], doubts: &[CalibrationDoubt]) -> PyResult<Vec<String>> {
+pub fn raised_or_warned(recordings: &[Recording], doubts: &[CalibrationDoubt]) -> PyResult<Vec<String>> {
     let mut warnings = Vec::new();
     for doubt in doubts {
         let places = doubt.recordings();

@@ -19,7 +19,7 @@ use crate::error::{Place, raise};
 /// Answers about files: the flags of `ohmstrain import`, and the units of a trace's columns.
 #[derive(Debug, FromPyObject)]
 #[pyo3(from_item_all)]
-pub struct Said {
+pub struct Arguments {
     preset: Option<String>,
     columns: Vec<(String, String)>,
     units: Vec<(String, String)>,
@@ -59,7 +59,7 @@ fn pairs<K: FromStr<Err: std::fmt::Display>, V: Clone, T>(
     given.iter().map(|(key, given)| Ok((value(argument, key)?, of(given.clone())?))).collect()
 }
 
-impl Said {
+impl Arguments {
     fn metadata(&self) -> PyResult<Metadata> {
         Ok(Metadata {
             gauge_length_mm: self.gauge_length_mm,
@@ -75,7 +75,7 @@ impl Said {
         let metadata = self.metadata()?;
         let mut units = pairs("units", &self.units, Ok)?;
         for (role, unit) in [("strain", &self.strain_unit), ("resistance", &self.resistance_unit)] {
-            // Before what is said by role, which counts more.
+            // Before the arguments by role, which counts more.
             units.splice(0..0, unit.clone().map(|unit| Ok::<_, PyErr>((value("units", role)?, unit))).transpose()?);
         }
         Ok(Recipe {
@@ -111,10 +111,10 @@ impl Said {
 
 /// The recording in files, and what was taken for what, or left out, a line each.
 #[pyfunction]
-pub fn read(py: Python, paths: Vec<String>, said: Said) -> PyResult<(PyRecordBatch, Vec<String>)> {
-    let (recipe, metadata) = (said.recipe()?, said.metadata()?);
+pub fn read(py: Python, paths: Vec<String>, arguments: Arguments) -> PyResult<(PyRecordBatch, Vec<String>)> {
+    let (recipe, metadata) = (arguments.recipe()?, arguments.metadata()?);
     let (trace, remarks) = py.detach(|| match &paths[..] {
-        [path] if said.units.is_empty() && Said::is_of_trace(&recipe) => match trace(path, &metadata)? {
+        [path] if arguments.units.is_empty() && Arguments::is_of_trace(&recipe) => match trace(path, &metadata)? {
             Some(trace) => Ok((trace, vec![])),
             None => imported(&paths, &recipe),
         },

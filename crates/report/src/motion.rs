@@ -6,7 +6,7 @@ use super::axis::extent;
 
 /// Motion of the strain at a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Motion {
+pub enum MotionKind {
     /// Rising strain.
     Extend,
     /// Falling strain.
@@ -171,9 +171,9 @@ fn hold(samples: &[Sample], window: (usize, usize)) -> Option<Hold> {
 }
 
 /// Returns the motion of the strain at each row: turning points are found by the distance that the strain goes back, `holds` laid over it.
-pub fn motions(time_s: &[f64], strain: &[f64], holds: &[Hold]) -> Vec<Motion> {
+pub fn motions(time_s: &[f64], strain: &[f64], holds: &[Hold]) -> Vec<MotionKind> {
     let (samples, range) = known(time_s, strain);
-    let mut motions = vec![Motion::Extend; time_s.len()];
+    let mut motions = vec![MotionKind::Extend; time_s.len()];
     let mut begin = 0;
     let (mut motion, mut turn) = (None, samples.first().map_or((0, 0.0), |sample| (sample.row, sample.strain)));
     let (mut low, mut high) = (turn, turn);
@@ -181,24 +181,24 @@ pub fn motions(time_s: &[f64], strain: &[f64], holds: &[Hold]) -> Vec<Motion> {
         let here = (sample.row, sample.strain);
         (low, high) = (if here.1 < low.1 { here } else { low }, if here.1 > high.1 { here } else { high });
         let now = match motion {
-            None if here.1 - low.1 > TURN * range => Some(Motion::Extend),
-            None if high.1 - here.1 > TURN * range => Some(Motion::Retract),
-            Some(Motion::Extend) if high.1 - here.1 > TURN * range => Some(Motion::Retract),
-            Some(Motion::Retract) if here.1 - low.1 > TURN * range => Some(Motion::Extend),
+            None if here.1 - low.1 > TURN * range => Some(MotionKind::Extend),
+            None if high.1 - here.1 > TURN * range => Some(MotionKind::Retract),
+            Some(MotionKind::Extend) if high.1 - here.1 > TURN * range => Some(MotionKind::Retract),
+            Some(MotionKind::Retract) if here.1 - low.1 > TURN * range => Some(MotionKind::Extend),
             _ => continue,
         };
-        turn = if now == Some(Motion::Extend) { low } else { high };
+        turn = if now == Some(MotionKind::Extend) { low } else { high };
         fill(&mut motions, begin, turn.0, motion.or(now));
         (motion, begin, low, high) = (now, turn.0, here, here);
     }
     fill(&mut motions, begin, time_s.len(), motion);
     for hold in holds {
-        fill(&mut motions, hold.first, hold.last + 1, Some(Motion::Hold));
+        fill(&mut motions, hold.first, hold.last + 1, Some(MotionKind::Hold));
     }
     motions
 }
 
-fn fill(motions: &mut [Motion], from: usize, until: usize, motion: Option<Motion>) {
+fn fill(motions: &mut [MotionKind], from: usize, until: usize, motion: Option<MotionKind>) {
     let until = until.min(motions.len());
     if let (Some(rows), Some(motion)) = (motions.get_mut(from..until), motion) {
         rows.fill(motion);
@@ -207,7 +207,7 @@ fn fill(motions: &mut [Motion], from: usize, until: usize, motion: Option<Motion
 
 #[cfg(test)]
 mod tests {
-    use super::{Hold, Motion, holds, levels_first, motions};
+    use super::{Hold, MotionKind, holds, levels_first, motions};
 
     fn clock(rows: usize) -> Vec<f64> {
         (0..rows).map(|k| 0.1 * k as f64).collect()
@@ -254,10 +254,10 @@ mod tests {
         let (time, strain) = protocol();
         let found = motions(&time, &strain, &holds(&time, &strain, 5.0));
         let at = |t: f64| found[(10.0 * t) as usize];
-        assert_eq!(at(15.0), Motion::Extend);
-        assert_eq!(at(50.0), Motion::Hold);
-        assert_eq!(at(72.0), Motion::Retract);
-        assert_eq!(at(100.0), Motion::Hold);
+        assert_eq!(at(15.0), MotionKind::Extend);
+        assert_eq!(at(50.0), MotionKind::Hold);
+        assert_eq!(at(72.0), MotionKind::Retract);
+        assert_eq!(at(100.0), MotionKind::Hold);
         assert_eq!(motions(&[], &[], &[]), []);
         assert_eq!(motions(&[0.0], &[f64::NAN], &[]).len(), 1);
     }

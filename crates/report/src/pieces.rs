@@ -4,7 +4,7 @@ use super::ReportError;
 use super::axis::extent;
 use super::chart::WIDE;
 use super::figures::{Figure, draw_strain, strain_chart};
-use super::motion::Motion;
+use super::motion::MotionKind;
 use super::recording::PlottedRecording;
 use ohmstrain::number::significant;
 
@@ -45,10 +45,10 @@ pub fn strain(recording: &PlottedRecording) -> Result<(Vec<Figure>, String), Rep
 
 /// Returns the number of pieces: enough for the number of movements, and for movements that are short beside the recording, like
 /// ramps between long holds.
-fn count(motions: &[Motion], time_s: &[f64]) -> usize {
+fn count(motions: &[MotionKind], time_s: &[f64]) -> usize {
     let ends: Vec<usize> = (1..motions.len()).filter(|row| motions[*row] != motions[*row - 1]).collect();
     let lasting = |pair: &[usize]| time_s.get(pair[1]).zip(time_s.get(pair[0])).map(|(end, start)| end - start);
-    let moving = ends.windows(2).filter(|pair| motions[pair[0]] != Motion::Hold);
+    let moving = ends.windows(2).filter(|pair| motions[pair[0]] != MotionKind::Hold);
     let mut lengths: Vec<f64> = moving.filter_map(lasting).filter(|length| *length > 0.0).collect();
     lengths.sort_by(f64::total_cmp);
     let whole = extent(time_s.iter().copied()).map_or(0.0, |(first, last)| last - first);
@@ -58,27 +58,27 @@ fn count(motions: &[Motion], time_s: &[f64]) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::{Motion, count};
+    use super::{MotionKind, count};
 
     #[test]
     fn short_movements_between_long_holds_make_pieces() {
         // Eight ramps of 10 s in 2400 s are 1/240 of it each: a plot that shows one at a fortieth of its width has a sixth.
         let phase = |k: usize| match k % 600 {
-            0..10 => Motion::Extend,
-            300..310 => Motion::Retract,
-            _ => Motion::Hold,
+            0..10 => MotionKind::Extend,
+            300..310 => MotionKind::Retract,
+            _ => MotionKind::Hold,
         };
         let time_s: Vec<f64> = (0..2400).map(|k| k as f64).collect();
-        let motions: Vec<Motion> = (0..2400).map(phase).collect();
+        let motions: Vec<MotionKind> = (0..2400).map(phase).collect();
         assert_eq!(count(&motions, &time_s), 6);
         // Ramps without holds, ten in all, fill one plot.
-        let ramps: Vec<Motion> =
-            (0..1000).map(|k| if k / 100 % 2 == 0 { Motion::Extend } else { Motion::Retract }).collect();
+        let ramps: Vec<MotionKind> =
+            (0..1000).map(|k| if k / 100 % 2 == 0 { MotionKind::Extend } else { MotionKind::Retract }).collect();
         assert_eq!(count(&ramps, &time_s[..1000]), 1);
         assert_eq!(count(&[], &[]), 0);
         // The number follows the length: a hundred such recordings in a row take a hundred times as many.
         let long_s: Vec<f64> = (0..240_000).map(|k| k as f64).collect();
-        let long: Vec<Motion> = (0..240_000).map(phase).collect();
+        let long: Vec<MotionKind> = (0..240_000).map(phase).collect();
         assert_eq!(count(&long, &long_s), 600);
     }
 }

@@ -5,7 +5,7 @@ use ohmstrain_sensor::{Quantity, ReadingUnit, SensorParams};
 
 use super::axis::extent;
 use super::law::{Driven, Law};
-use super::motion::{self, Hold, Motion};
+use super::motion::{self, Hold, MotionKind};
 use super::{ReportInput, Scored};
 use ohmstrain::number::significant;
 
@@ -37,7 +37,7 @@ pub struct PlottedRecording<'a> {
     /// The sensor's law.
     pub law: Law<'a>,
     /// Motion of the strain, row by row.
-    pub motions: Vec<Motion>,
+    pub motions: Vec<MotionKind>,
     /// The law driven by the reference.
     pub driven: Option<Driven>,
     strain: Vec<f64>,

@@ -5,7 +5,7 @@ use super::axis::{Axis, extent};
 use super::chart::{Chart, HIGH, WIDE};
 use super::figures::{Figure, HIGH_TICKS};
 use super::ink::Ink;
-use super::motion::Motion;
+use super::motion::MotionKind;
 use super::recording::PlottedRecording;
 use super::thin::Point;
 use ohmstrain::number::{plain, significant};
@@ -54,7 +54,7 @@ fn arrows(recording: &PlottedRecording) -> Vec<(Point, Point)> {
     let mut first = 0;
     for row in 1..=motions.len() {
         if motions.get(row) != motions.get(first) {
-            if motions.get(first).is_some_and(|motion| *motion != Motion::Hold) {
+            if motions.get(first).is_some_and(|motion| *motion != MotionKind::Hold) {
                 movements.push((first, row - 1));
             }
             first = row;

@@ -5,7 +5,7 @@ use super::axis::{Axis, extent};
 use super::chart::{Chart, HIGH};
 use super::figures::{Figure, HIGH_TICKS};
 use super::ink::Ink;
-use super::motion::Motion;
+use super::motion::MotionKind;
 use super::recording::PlottedRecording;
 use ohmstrain::number::significant;
 
@@ -101,7 +101,7 @@ fn movements(recording: &PlottedRecording) -> Vec<Movement> {
         }
         let (begin, last) = (first, row - 1);
         first = row;
-        if motions[begin] == Motion::Hold || last <= begin {
+        if motions[begin] == MotionKind::Hold || last <= begin {
             continue;
         }
         let known = |row: &usize| time_s.get(*row).zip(strain.get(*row)).is_some_and(|(_, x)| x.is_finite());

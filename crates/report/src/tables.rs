@@ -93,13 +93,13 @@ pub fn parameters(params: &SensorParams, rest_reading: f64) -> Vec<Table> {
 const Z_95: f64 = 1.96;
 
 /// Rows of a parameter table under construction.
-struct Rows<'a> {
+struct ParameterRows<'a> {
     rows: Vec<[String; 4]>,
     uncertainty: Option<&'a Uncertainty>,
     found: Vec<usize>,
 }
 
-impl Rows<'_> {
+impl ParameterRows<'_> {
     /// Adds the value that the filter runs with, and its uncertainty under its `path` in the sensor's file.
     fn fitted(&mut self, name: &str, path: &str, value: f64, unit: &str) {
         let place = self.uncertainty.and_then(|known| known.names.iter().position(|name| name == path));
@@ -132,7 +132,7 @@ fn told(known: &Uncertainty, place: Option<usize>) -> String {
 
 fn law(params: &SensorParams, rest_reading: f64) -> Table {
     let (law, quantity) = (&params.law, params.quantity);
-    let mut rows = Rows { rows: vec![], uncertainty: params.uncertainty.as_ref(), found: vec![] };
+    let mut rows = ParameterRows { rows: vec![], uncertainty: params.uncertainty.as_ref(), found: vec![] };
     let reading = match params.reading {
         ReadingUnit::Ohm => "Ω",
         ReadingUnit::Ratio => "–",
@@ -170,7 +170,7 @@ fn law(params: &SensorParams, rest_reading: f64) -> Table {
     )
 }
 
-fn gauge(rows: &mut Rows, gauge: &GaugeParams, quantity: Quantity) {
+fn gauge(rows: &mut ParameterRows, gauge: &GaugeParams, quantity: Quantity) {
     let per = |power| per_quantity(quantity, power);
     match *gauge {
         GaugeParams::Polynomial { coefficients } => {

@@ -3,7 +3,7 @@ use std::collections::BTreeMap;
 use ohmstrain::Estimate;
 use ohmstrain_sensor::{
     BranchParams, EstimatorKind, EstimatorParams, GaugeParams, LawParams, MotionParams, NoiseParams, Quantity,
-    RangeParams, ReadingUnit, SensorParams, StaticCubic, Uncertainty, Validity,
+    RangeParams, ReadingUnit, SensorParams, StaticCubic, Uncertainty, Unstated, Validity,
 };
 
 use super::{Report, ReportInput, Sample, ScoreRow, Scored};
@@ -52,9 +52,11 @@ fn sensor() -> SensorParams {
             duration_s: 100.0,
             drifts: false,
             longest_repeat_s: 0.0,
+            longest_unturned_s: None,
             resolution: None,
         },
         sessions: None,
+        unstated: Unstated::default(),
         static_cubic: StaticCubic {
             reading_centre: 1200.0,
             reading_scale: 200.0,

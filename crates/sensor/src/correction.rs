@@ -4,7 +4,7 @@ use std::ops::Deref;
 
 use ohmstrain_ekf::Real;
 use ohmstrain_ekf::correction::{
-    BLOCK, Correction, FEATURES, FILTER_INPUTS, InputScale, OUTPUTS, OneSided, Process, RowBlock, Rows, Simulated,
+    BLOCK, Correction, FEATURES, FILTER_INPUTS, InputRows, InputScale, OUTPUTS, OneSided, Process, RowBlock, Simulated,
     Triangle, block_of, filter_inputs, stripe_places, stripes,
 };
 use ohmstrain_model::StrainRange;
@@ -68,8 +68,8 @@ impl<T: Copy, const D: usize> OwnedRows<T, D> {
         &self.blocks
     }
 
-    fn as_rows(&self) -> Rows<'_, T, D> {
-        Rows::new(&self.blocks, self.rows.len())
+    fn as_rows(&self) -> InputRows<'_, T, D> {
+        InputRows::new(&self.blocks, self.rows.len())
     }
 
     fn map<U: Copy>(&self, number: impl Fn(T) -> U + Copy) -> OwnedRows<U, D> {

@@ -24,11 +24,12 @@ pub use params::correction::{
 pub use params::estimator::{
     EstimatorKind, EstimatorParams, MotionParams, NoParameters, NoiseParams, PhaseParams, SettlingParams,
 };
-pub use params::findings::{ErrorBudget, ErrorShares, Findings, Scores, Seen, TENTHS};
+pub use params::findings::{ErrorBudget, ErrorShares, Findings, RecordingSummary, Scores, TENTHS};
 pub use params::law::{BranchParams, GaugeParams, LawParameter, LawParams, MOST_BRANCHES};
 pub use params::range::RangeParams;
 pub use params::static_cubic::StaticCubic;
 pub use params::summary::{Limit, Summary, TestedSummary};
+pub use params::unstated::Unstated;
 pub use params::validate::FieldError;
 pub use params::validate::table as ranges;
 pub use params::{
@@ -41,4 +42,5 @@ pub use run::known::{KnownErrors, KnownStrain, MOST_KNOWN};
 pub use run::learned::Learned;
 pub use run::options::Options;
 pub use run::portable::{PortableCorrection, PortableFilter};
+pub use run::turns::Turns;
 pub use run::{Filter, Output, Rows, Smoother, Start, WayBack};

@@ -2,10 +2,10 @@
 
 use js_sys::{Date, Function, JSON};
 use ohmstrain::{
-    Calibration, Closing, EstimatorKind, GaugeFamily, LeftOutRow, Quantity, ReadingUnit, Stage, Tested,
+    Calibration, Closing, EstimatorKind, GaugeFamily, Kept, LeftOutRow, Quantity, ReadingUnit, Stage, Tested,
     calibration_doubts, motion_doubts,
 };
-use ohmstrain_calib::{Baseline, Samples, ScoredRow, screen};
+use ohmstrain_calib::{Samples, screen};
 use serde::Deserialize;
 use wasm_bindgen::prelude::*;
 
@@ -13,9 +13,6 @@ use crate::doubts::{heed, on_one_clock, shift, warn_of_distrusted};
 use crate::json::{json, refused};
 use crate::recording::Recording;
 use crate::sensor::Sensor;
-
-/// Least number of rows for a score.
-const FEWEST_ROWS: usize = 10;
 
 /// Choices of a calibration; each has a default.
 #[derive(Debug, Default, Deserialize)]
@@ -117,10 +114,11 @@ fn run(wholes: Vec<Recording>, choices: &Choices, progress: Option<&Function>) -
             kept.push((whole, part.first_row..part.first_row + part.trace.len()));
         }
     }
-    let tested = tested(&kept, &calibrated.sensor);
-    let mut params = calibrated.sensor.into_params();
-    params.tested = tested.as_ref().map(Into::into);
-    let sensor = ohmstrain::Sensor::from_params(params).map_err(|error| error.to_string())?;
+    let rows: Vec<_> = kept.iter().map(|(whole, _)| |row| whole.known_row(row)).collect();
+    let kept =
+        kept.iter().zip(&rows).map(|((whole, seen), row)| Kept { len: whole.trace.len(), row, seen: seen.clone() });
+    let tested = calibrated.sensor.tested_on(&kept.collect::<Vec<_>>());
+    let (sensor, tested) = tested.map_err(|error| error.to_string())?;
     let closing = Closing {
         file: choices.file.as_deref(),
         params: sensor.params(),
@@ -219,33 +217,6 @@ fn tell(progress: Option<&Function>, stage: Stage) {
     };
     // A listener that fails does not stop a calibration.
     let _ = progress.call2(&JsValue::NULL, &words.into(), &share.into());
-}
-
-/// Scores the default estimator on rows that were kept from the calibration, as it would run live; `None` if there are few.
-fn tested(kept: &[(Recording, std::ops::Range<usize>)], sensor: &ohmstrain::Sensor) -> Option<Tested> {
-    let (mut ours, mut cubics): (Vec<ScoredRow>, Vec<ScoredRow>) = (vec![], vec![]);
-    for (whole, seen) in kept {
-        let mut filter = sensor.filter().build().ok()?;
-        let mut cubic = ohmstrain_calib::running_cubic(sensor.params().static_cubic);
-        // Times go on from recording to recording, so that none goes back.
-        let after = ours.last().map_or(0.0, |row| row.time_s);
-        for row in 0..whole.trace.len() {
-            let (time_s, reading) = whole.row(row);
-            let estimate = filter.step(time_s, reading).ok()?;
-            let on_cubic = cubic.strain(time_s, reading.value);
-            let truth = whole.truth(row);
-            if !seen.contains(&row) && truth.is_finite() {
-                let time_s = after + time_s - whole.trace.time_s[0];
-                ours.push(ScoredRow { time_s, truth, strain: estimate.strain, sd: Some(estimate.strain_sd) });
-                cubics.push(ScoredRow { time_s, truth, strain: on_cubic, sd: None });
-            }
-        }
-    }
-    if ours.len() < FEWEST_ROWS {
-        return None;
-    }
-    let (filter, static_cubic) = (ohmstrain_calib::score(&ours)?, ohmstrain_calib::score(&cubics)?);
-    filter.rmse_percent_fs.is_finite().then_some(Tested { filter, static_cubic })
 }
 
 #[wasm_bindgen]

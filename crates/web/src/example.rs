@@ -1,7 +1,7 @@
 //! A recording of the simulator.
 
 use ohmstrain::MADE_BY;
-use ohmstrain_bench_data::simulate::{Material, Protocol, SimulationSettings, simulate};
+use ohmstrain_bench_data::simulate::{SimulationSettings, simulate};
 use wasm_bindgen::prelude::*;
 
 use crate::json::refused;
@@ -10,12 +10,7 @@ use crate::recording::Recording;
 /// A simulated bench session, that of `ohmstrain demo` with this seed.
 #[wasm_bindgen]
 pub fn example(seed: u32) -> Result<Recording, JsError> {
-    let settings = SimulationSettings {
-        speed_mm_s: 5.0,
-        mismatched: true,
-        seed: seed.into(),
-        ..SimulationSettings::new(Material::Representative, Protocol::MIXED)
-    };
+    let settings = SimulationSettings { seed: seed.into(), ..SimulationSettings::example() };
     let mut trace = simulate(&settings).map_err(refused)?;
     trace.metadata.other.push(("made_by".into(), format!("{MADE_BY} simulate")));
     let mut bytes = Vec::new();

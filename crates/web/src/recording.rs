@@ -42,6 +42,12 @@ impl Recording {
         (time_s, Reading { value, sd, saturated })
     }
 
+    /// Returns time, reading and reference in a row.
+    pub(crate) fn known_row(&self, row: usize) -> (f64, Reading, f64) {
+        let (time_s, reading) = self.row(row);
+        (time_s, reading, self.truth(row))
+    }
+
     /// The reference in a row; NaN where it is missing.
     pub(crate) fn truth(&self, row: usize) -> f64 {
         let value = self.trace.reference.as_ref().and_then(|reference| reference.values.get(row));

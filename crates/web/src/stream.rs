@@ -50,7 +50,7 @@ struct Counts {
 
 /// Summary of a stream.
 #[derive(Serialize)]
-struct Said<'a> {
+struct Described<'a> {
     counts: Counts,
     message: &'a str,
     /// Columns that were found; none before a header.
@@ -239,7 +239,7 @@ impl Stream {
         let mut metadata = self.lines.parser.metadata();
         metadata.other.retain(|(key, _)| key != "made_by");
         let metadata = format!("# made_by = {MADE_BY} live\n{metadata}");
-        json(&Said { counts: self.counts, message: &self.message, columns: self.columns(), metadata })
+        json(&Described { counts: self.counts, message: &self.message, columns: self.columns(), metadata })
     }
 
     /// The sensor is at rest, unstretched: the strain is zero now.

@@ -5,7 +5,7 @@ use super::matched::Matched;
 use super::mismatched::Mismatched;
 use super::noise::{Drift, Stream, conditioning, normal, random};
 use super::profile::Profile;
-use super::sensor::{Movement, Sensor};
+use super::sensor::{Movement, StretchedSensor};
 use super::{GAUGE_LENGTH_MM, SettingsError, SimulationSettings};
 use crate::metadata::Metadata;
 use crate::row::{ReadingKind, ReferenceQuantity};
@@ -53,7 +53,7 @@ struct Sample {
 }
 
 /// Leads the sensor through the profile, sampling at a fixed rate from time zero to the end.
-fn run(profile: &Profile, rate_hz: f64, sensor: &mut impl Sensor) -> Vec<Sample> {
+fn run(profile: &Profile, rate_hz: f64, sensor: &mut impl StretchedSensor) -> Vec<Sample> {
     let at_rest = Sample { time_s: 0.0, strain: 0.0, relative_change: 0.0, travel: 0.0 };
     let mut samples = vec![at_rest];
     let (mut now_s, mut travel) = (0.0, 0.0);

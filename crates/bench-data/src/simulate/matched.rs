@@ -1,7 +1,7 @@
 use ohmstrain_model::{Branch, Gauge, SensorLaw, StrainRange};
 
 use super::Material;
-use super::sensor::{Movement, Sensor};
+use super::sensor::{Movement, StretchedSensor};
 
 /// A sensor of the family that is fitted: the switched Kelvin-Voigt law with two branches.
 pub(super) struct Matched {
@@ -15,7 +15,7 @@ impl Matched {
     }
 }
 
-impl Sensor for Matched {
+impl StretchedSensor for Matched {
     /// Exact for constant gains; gains affine in strain are taken at mid-strain, which is of second order in a step
     /// of at most 10 ms.
     fn advance(&mut self, movement: &Movement) {

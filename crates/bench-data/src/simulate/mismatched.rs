@@ -2,7 +2,7 @@ use ohmstrain_model::Phase;
 
 use super::Material;
 use super::individual::{CHARACTER_SPREAD, Individual};
-use super::sensor::{Movement, Sensor};
+use super::sensor::{Movement, StretchedSensor};
 
 const BRANCHES: usize = 9;
 const PLAYS: usize = 3;
@@ -133,7 +133,7 @@ impl Mismatched {
     }
 }
 
-impl Sensor for Mismatched {
+impl StretchedSensor for Mismatched {
     fn advance(&mut self, movement: &Movement) {
         // The drive fades with what it has driven: evaluate it in the middle of the step, which is of second order.
         let half = self.relaxed(movement, 0.5, self.drive(movement, &self.relaxation));

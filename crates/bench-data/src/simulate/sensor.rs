@@ -24,7 +24,7 @@ impl Movement {
 }
 
 /// Sensor that the bench stretches.
-pub(super) trait Sensor {
+pub(super) trait StretchedSensor {
     /// Moves the sensor through a movement.
     fn advance(&mut self, movement: &Movement);
 

@@ -49,6 +49,12 @@ impl SimulationSettings {
         }
     }
 
+    /// The example: a sensor outside the family of laws that is fitted, stretched by up to 10 mm at up to 5 mm/s.
+    #[must_use]
+    pub const fn example() -> Self {
+        Self { speed_mm_s: 5.0, mismatched: true, ..Self::new(Material::Representative, Protocol::MIXED) }
+    }
+
     /// Checks every setting.
     ///
     /// # Errors

@@ -131,14 +131,14 @@ mod tests {
                 let square = |t: &f64| (start(scaled(reading(*t))) - scaled(low_passed(*t, tau_s))).powi(2);
                 (moments.iter().map(square).sum::<f64>() / moments.len() as f64).sqrt()
             };
-            let (told, at_rest) = (off(&|y| a + b * y), off(&|y| y));
+            let (fitted, at_rest) = (off(&|y| a + b * y), off(&|y| y));
             // No line is better: none with another offset or slope.
             for (da, db) in [(0.05, 0.0), (-0.05, 0.0), (0.0, 0.05), (0.0, -0.05)] {
-                assert!(off(&|y| a + da + (b + db) * y) > told, "τ = {tau_s} s: {a}, {b}");
+                assert!(off(&|y| a + da + (b + db) * y) > fitted, "τ = {tau_s} s: {a}, {b}");
             }
             // A low-pass that is slower than the motion is near its mean, not at the reading.
             let most = if tau_s > 4.0 { 0.5 } else { 1.0 };
-            assert!(told < most * at_rest, "τ = {tau_s} s: {told} {at_rest}");
+            assert!(fitted < most * at_rest, "τ = {tau_s} s: {fitted} {at_rest}");
         }
     }
 

@@ -1,6 +1,7 @@
 //! Quality of a calibration on held-out parts of the recordings, its calibrated range, and the limits of its accuracy.
 
 use std::collections::BTreeMap;
+use std::mem;
 use std::sync::Arc;
 
 use crate::CalibrationError;
@@ -9,6 +10,7 @@ use crate::calibrate::correction_fit::fit_correction;
 use crate::calibrate::error_budget::{Direction, WrongDirection, error_budget};
 use crate::calibrate::left_out::relative_changes;
 use crate::calibrate::scores::{ScoredRow, score_of_full_scale};
+use crate::calibrate::unstated::unstated;
 use crate::law::fit::CrossFit;
 use crate::law::identifiability::Identifiability;
 use crate::law::structure::LawFit;
@@ -16,13 +18,13 @@ use crate::motion_stats::MotionStats;
 use crate::prior::CorrectionPrior;
 use crate::samples::Samples;
 use ohmstrain_sensor::{
-    EstimatorKind, EstimatorParams, FilterParts, Findings, Learned, NoParameters, RangeParams, Seen, SensorError,
-    TENTHS,
+    EstimatorKind, EstimatorParams, FilterParts, Findings, Learned, NoParameters, RangeParams, RecordingSummary,
+    SensorError, TENTHS, Unstated,
 };
 use rayon::prelude::*;
 
 /// Contents of the recordings of a calibration.
-pub(crate) fn seen(recordings: &[Samples], range: RangeParams, stats: &MotionStats) -> Seen {
+pub(crate) fn seen(recordings: &[Samples], range: RangeParams, stats: &MotionStats) -> RecordingSummary {
     let mut counts = [0_usize; TENTHS];
     for samples in recordings {
         for k in samples.complete_rows() {
@@ -31,7 +33,7 @@ pub(crate) fn seen(recordings: &[Samples], range: RangeParams, stats: &MotionSta
         }
     }
     let rows: usize = counts.iter().sum();
-    Seen {
+    RecordingSummary {
         range,
         tenths: counts.map(|count| count as f64 / rows.max(1) as f64),
         quartile_speeds: stats.quartile_speeds,
@@ -66,7 +68,7 @@ pub struct LeftOutRow {
     pub truth: f64,
     /// The filter's strain.
     pub strain: f64,
-    /// Its standard deviation.
+    /// Its standard deviation, with the error that is not stated in other quarters.
     pub strain_sd: f64,
     /// The static cubic's strain.
     pub static_cubic: f64,
@@ -95,6 +97,13 @@ impl Scored {
         self.directions.extend(next.directions);
     }
 
+    /// Adds errors that are not stated to the deviations.
+    fn widen(&mut self, unstated: Unstated) {
+        self.rows.iter_mut().for_each(|row| row.strain_sd = row.strain_sd.hypot(unstated.filter_sd));
+        self.filter.iter_mut().for_each(|row| *row = row.with_unstated(unstated.filter_sd));
+        self.smoother.iter_mut().for_each(|row| *row = row.with_unstated(unstated.smoother_sd));
+    }
+
     fn wrong_direction(&self) -> WrongDirection {
         let mut wrong = WrongDirection::default();
         self.directions.iter().for_each(|(direction, rate, error)| wrong.see(*direction, *rate, *error));
@@ -102,32 +111,61 @@ impl Scored {
     }
 }
 
+/// Quality of a calibration on held-out quarters.
+pub(crate) struct Checked {
+    pub findings: Findings,
+    /// Errors on them that the estimators do not state.
+    pub unstated: Unstated,
+    pub rows: Vec<LeftOutRow>,
+}
+
+/// Errors in quarters that the estimators do not state.
+fn unstated_in<'b>(blocks: impl Iterator<Item = &'b Scored>) -> Unstated {
+    let (mut filter, mut smoother) = (Vec::new(), Vec::new());
+    for block in blocks {
+        filter.extend_from_slice(&block.filter);
+        smoother.extend_from_slice(&block.smoother);
+    }
+    unstated(&filter, &smoother)
+}
+
+/// Returns all rows, those of each quarter with the errors that are not stated in the others: coverage in it is that of a part
+/// that nothing was learned from.
+fn widened(mut blocks: Vec<Scored>) -> Scored {
+    let others = |block: usize| blocks.iter().enumerate().filter(move |(k, _)| *k != block).map(|(_, scored)| scored);
+    let unstated: Vec<Unstated> = (0..blocks.len()).map(|block| unstated_in(others(block))).collect();
+    let mut scored = Scored::default();
+    for (block, unstated) in blocks.iter_mut().zip(unstated) {
+        block.widen(unstated);
+        scored.append(mem::take(block));
+    }
+    scored
+}
+
 impl Check<'_> {
-    /// Scores every quarter with what was fitted to the others, and the rows of it; `None` if they cannot be estimated.
-    pub(crate) fn findings(&self, seen: Seen, told: &Option<Identifiability>) -> Option<(Findings, Vec<LeftOutRow>)> {
-        let scored = self.scored().ok()?;
+    /// Scores every quarter with what was fitted to the others; `None` if they cannot be estimated.
+    pub(crate) fn checked(&self, seen: RecordingSummary, identifiability: &Option<Identifiability>) -> Option<Checked> {
+        let blocks = self.blocks().ok()?;
+        let unstated = unstated_in(blocks.iter());
+        let scored = widened(blocks);
         let findings = Findings {
             filter: score_of_full_scale(&scored.filter)?,
             smoother: score_of_full_scale(&scored.smoother),
             static_cubic: score_of_full_scale(&scored.static_cubic)?,
             budget: error_budget(self.recordings, self.fit, &scored.wrong_direction()),
             seen,
-            advice: told.as_ref().map_or_else(Vec::new, |told| told.advice.clone()),
+            advice: identifiability.as_ref().map_or_else(Vec::new, |identifiability| identifiability.advice.clone()),
         };
-        Some((findings, scored.rows))
+        Some(Checked { findings, unstated, rows: scored.rows })
     }
 
-    fn scored(&self) -> Result<Scored, CalibrationError> {
+    fn blocks(&self) -> Result<Vec<Scored>, CalibrationError> {
         let directions: Vec<Vec<Direction>> = self.recordings.iter().map(Direction::of_rows).collect();
         let blocks: Vec<Result<Scored, CalibrationError>> = (0..self.fit.without_block.len())
             .into_par_iter()
             .map(|block| self.scored_block(block, &directions))
             .collect();
-        let mut scored = Scored::default();
-        for block in blocks {
-            scored.append(block?);
-        }
-        Ok(scored)
+        blocks.into_iter().collect()
     }
 
     fn scored_block(&self, block: usize, directions: &[Vec<Direction>]) -> Result<Scored, CalibrationError> {

@@ -32,11 +32,11 @@ pub(crate) struct Fold<'a> {
 }
 
 /// Predicted fall of a reading, by a law that has not seen it.
-pub(crate) struct SaidFall {
+pub(crate) struct PredictedFall {
     pub recording: usize,
     pub row: usize,
     /// Relative to R₀.
-    pub said: f64,
+    pub predicted: f64,
     /// R₀ of that law.
     pub rest_reading: f64,
 }
@@ -130,18 +130,18 @@ impl<'a> LeftOut<'a> {
 
     /// Returns a filter's predictions in `rows` of each recording, in order, of the fall of the readings; `None` if it fails. Valid only
     /// if no row was left out for a stride.
-    pub(crate) fn falls(&self, build: &Build, rows: &[Vec<usize>]) -> Option<Vec<SaidFall>> {
+    pub(crate) fn falls(&self, build: &Build, rows: &[Vec<usize>]) -> Option<Vec<PredictedFall>> {
         let mut falls = Vec::new();
         for run in &self.runs {
             let mut filter = build(run.fold).filter(None).ok()?;
             for k in 0..run.block.end {
                 filter.step(run.time_s[k], run.reading[k]).ok()?;
                 if k >= run.block.start && rows[run.recording].binary_search(&k).is_ok() {
-                    let said = filter.output().estimate.still_relaxes.mean;
-                    falls.push(SaidFall {
+                    let predicted = filter.output().estimate.still_relaxes.mean;
+                    falls.push(PredictedFall {
                         recording: run.recording,
                         row: k,
-                        said,
+                        predicted,
                         rest_reading: run.fold.rest_reading,
                     });
                 }

@@ -11,6 +11,7 @@ pub(crate) mod recipe;
 pub(crate) mod scores;
 pub(crate) mod settling;
 pub(crate) mod simulated_motions;
+pub(crate) mod unstated;
 pub(crate) mod with_prior;
 
 use std::collections::BTreeMap;
@@ -18,7 +19,7 @@ use std::collections::BTreeMap;
 use crate::CalibrationError;
 use crate::baselines::fit_static_cubic;
 use crate::calibrate::correction_fit::fit_correction;
-use crate::calibrate::findings::{Check, LeftOutRow, seen};
+use crate::calibrate::findings::{Check, Checked, LeftOutRow, seen};
 use crate::calibrate::noise_fit::{
     NoiseProblem, REFINEMENT, SURVEY, Surveyed, best_of_each_size, survey, survey_evaluations,
 };
@@ -35,10 +36,11 @@ use crate::recording::resolution::resolution;
 use crate::recording::rest::rest_share;
 use crate::recording::screen::{Distrusted, screen};
 use crate::recording::sessions::sessions;
+use crate::recording::turns::longest_unturned_s;
 use crate::samples::{Samples, reading_range};
 use ohmstrain_sensor::{
     CorrectionParams, EstimatorKind, EstimatorParams, FORMAT, FilterParts, Findings, LawParams, Quantity, RangeParams,
-    ReadingUnit, SensorParams, Sessions, StaticCubic, Summary, Uncertainty, Validity,
+    ReadingUnit, SensorParams, Sessions, StaticCubic, Summary, Uncertainty, Unstated, Validity,
 };
 
 /// Stage of a calibration, for a progress bar.
@@ -85,6 +87,8 @@ pub struct Calibration {
     pub sessions: Option<Sessions>,
     /// The static inverse fitted to the same rows.
     pub static_cubic: StaticCubic,
+    /// Errors on held-out parts that the estimators do not state.
+    pub unstated: Unstated,
     /// Quality on held-out parts; `None` if they cannot be estimated.
     pub findings: Option<Findings>,
     /// The rows of those parts; none if they cannot be estimated.
@@ -110,6 +114,7 @@ impl Calibration {
             limits: self.limits,
             validity: self.validity,
             sessions: self.sessions,
+            unstated: self.unstated,
             static_cubic: self.static_cubic,
             joint: None,
             law: self.law,
@@ -199,13 +204,17 @@ pub(crate) fn calibrate_once(
     (steps.progress)(Stage::LeftOut);
     let identifiability = identifiability(recordings, &fit.law.law).ok();
     let seen = seen(recordings, limits, &stats);
-    let findings = Check { recordings, fit, kind: default_estimator, filter, estimators: &estimators, of_make }
-        .findings(seen, &identifiability);
-    let (findings, left_out) = findings.map_or((None, vec![]), |(findings, rows)| (Some(findings), rows));
+    let checked = Check { recordings, fit, kind: default_estimator, filter, estimators: &estimators, of_make }
+        .checked(seen, &identifiability);
+    let (unstated, findings, left_out) = checked.map_or_else(Default::default, |checked| {
+        let Checked { findings, unstated, rows } = checked;
+        (unstated, Some(findings), rows)
+    });
     let own = validity(recordings, &fit.law, limits, &stats);
     Ok(Calibration {
         distrusted: screened.distrusted.clone(),
         default_estimator,
+        unstated,
         findings,
         left_out,
         estimators,
@@ -213,7 +222,7 @@ pub(crate) fn calibrate_once(
         static_cubic: fit_static_cubic(recordings, limits)?,
         validity: prior.map_or(own, |prior| prior.joined(own, median_rest(&fit.law.rest_readings))),
         limits,
-        uncertainty: identifiability.map(|found| found.told()),
+        uncertainty: identifiability.map(|found| found.off_bounds()),
         rest_share: rest_share(recordings, &fit.law.rest_readings, limits.span()),
         sessions: sessions(recordings, &fit.law.rest_readings, limits.span()),
         rest_readings: fit.law.rest_readings.clone(),
@@ -268,7 +277,7 @@ fn validity(recordings: &[Samples], fit: &LawFit, limits: RangeParams, stats: &M
     let ranges = recordings.iter().zip(rest_readings).map(|(samples, of)| of_sensor(*of, samples));
     let joined = |(low, high): (f64, f64), next: (f64, f64)| (low.min(next.0), high.max(next.1));
     let (reading_lower, reading_upper) = ranges.fold((f64::INFINITY, f64::NEG_INFINITY), joined);
-    Validity {
+    let seen = Validity {
         lower: limits.lower,
         upper: limits.upper,
         reading_lower,
@@ -277,8 +286,11 @@ fn validity(recordings: &[Samples], fit: &LawFit, limits: RangeParams, stats: &M
         duration_s: stats.longest_s,
         drifts: drifts(recordings, fit),
         longest_repeat_s: longest_repeat_s(recordings),
+        longest_unturned_s: None,
         resolution: resolution(recordings),
-    }
+    };
+    let longest_s = longest_unturned_s(recordings, rest_readings, seen.turn() / rest);
+    Validity { longest_unturned_s: (longest_s > 0.0).then_some(longest_s), ..seen }
 }
 
 /// The correction of the calibrated filter; none if nothing can be learned about it.

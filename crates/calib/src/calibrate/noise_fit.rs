@@ -233,8 +233,7 @@ impl<'a> NoiseProblem<'a> {
         stride(self.samples, rows)
     }
 
-    /// Logarithms of the parameters that the law's residuals and the motion of the strain suggest: noise (4), motion (3)
-    /// and, for filters of phases, durations, speed and tempering (4).
+    /// The point that the law's residuals and the motion of the strain suggest.
     fn start(&self) -> Vec<f64> {
         let mut left_out = Vec::new();
         for (block, law) in self.fit.without_block.iter().enumerate() {
@@ -245,50 +244,115 @@ impl<'a> NoiseProblem<'a> {
         let known: Vec<f64> = self.fit.law.residuals.iter().flatten().copied().filter(|r| r.is_finite()).collect();
         let fine = SHARE_OF_RESIDUAL * root_mean_square(&known).max(1e-9);
         let stats = &self.stats;
-        let mut start = vec![root_mean_square(&left_out).max(1e-9), BASELINE_TIME_S, fine, fine];
-        start.extend(match self.kind {
-            EstimatorKind::Imm | EstimatorKind::Hypotheses => {
-                [0.5 * stats.speed, stats.rate_time_s, 3.0 * stats.strain_sd]
-            }
-            _ => [stats.rate_sd, stats.rate_time_s, stats.strain_sd],
+        let (rate_sd_per_s, strain_sd) = match self.kind {
+            EstimatorKind::Imm | EstimatorKind::Hypotheses => (0.5 * stats.speed, 3.0 * stats.strain_sd),
+            _ => (stats.rate_sd, stats.strain_sd),
+        };
+        let phases = self.kind.has_phases().then(|| PhaseValues {
+            hold_time_s: stats.hold_s.unwrap_or(0.5),
+            move_time_s: stats.move_s,
+            speed_per_s: stats.speed.max(1e-12),
+            tempering: TEMPERING,
         });
-        if self.kind.has_phases() {
-            start.extend([stats.hold_s.unwrap_or(0.5), stats.move_s, stats.speed.max(1e-12), TEMPERING]);
-        }
-        start.iter().map(|x| x.ln()).collect()
+        let values = Values {
+            baseline_sd: root_mean_square(&left_out).max(1e-9),
+            baseline_time_s: BASELINE_TIME_S,
+            reading_sd: fine,
+            branch_sd: fine,
+            rate_sd_per_s,
+            rate_time_s: stats.rate_time_s,
+            strain_sd,
+            phases,
+        };
+        values.point()
     }
 
     fn params(&self, point: &[f64]) -> EstimatorParams {
-        let p: Vec<f64> = point.iter().map(|x| x.clamp(-25.0, 15.0).exp()).collect();
+        let values = Values::of(point);
         let strain_mean = self.of_make.map_or(self.stats.strain_mean, |prior| prior.strain_mean);
         let kind = self.kind;
-        let motion = MotionParams { rate_sd_per_s: p[4], rate_time_s: p[5], strain_mean, strain_sd: p[6] };
-        let phases = kind.has_phases().then(|| PhaseParams {
-            hold_time_s: p[7],
-            move_time_s: p[8],
+        let Values { rate_sd_per_s, rate_time_s, strain_sd, .. } = values;
+        let motion = MotionParams { rate_sd_per_s, rate_time_s, strain_mean, strain_sd };
+        let phases = values.phases.map(|phases| PhaseParams {
+            hold_time_s: phases.hold_time_s,
+            move_time_s: phases.move_time_s,
             reversal: match (self.of_make, kind, self.stats.hold_s) {
                 (Some(prior), ..) => prior.reversal,
                 (None, EstimatorKind::SignSplit, None) => 1.0,
                 _ => self.stats.reversal,
             },
-            speed_per_s: if kind == EstimatorKind::SignSplit { 0.0 } else { p[9] },
-            tempering: p[10].min(1.0),
+            speed_per_s: if kind == EstimatorKind::SignSplit { 0.0 } else { phases.speed_per_s },
+            tempering: phases.tempering.min(1.0),
         });
+        let Values { baseline_sd, baseline_time_s, reading_sd, branch_sd, .. } = values;
+        let reading_time_s = self.of_make.map_or(0.0, |prior| prior.reading_time_s);
         EstimatorParams {
             score: f64::NAN,
             strain_sd_scale: 1.0,
             smoothed_sd_scale: None,
             motion,
-            noise: NoiseParams {
-                baseline_sd: p[0],
-                baseline_time_s: p[1],
-                reading_sd: p[2],
-                reading_time_s: self.of_make.map_or(0.0, |prior| prior.reading_time_s),
-                branch_sd: p[3],
-            },
+            noise: NoiseParams { baseline_sd, baseline_time_s, reading_sd, reading_time_s, branch_sd },
             phases,
             settling: None,
         }
+    }
+}
+
+/// Values of the filters without phases.
+const OF_ALL: usize = 7;
+
+/// Parameters that a search finds, by name; their logarithms in this order are its point.
+struct Values {
+    baseline_sd: f64,
+    baseline_time_s: f64,
+    reading_sd: f64,
+    branch_sd: f64,
+    rate_sd_per_s: f64,
+    rate_time_s: f64,
+    strain_sd: f64,
+    /// Values of filters with phases.
+    phases: Option<PhaseValues>,
+}
+
+struct PhaseValues {
+    hold_time_s: f64,
+    move_time_s: f64,
+    speed_per_s: f64,
+    tempering: f64,
+}
+
+impl Values {
+    /// Reads a point of a search; a value that it does not have is NaN.
+    fn of(point: &[f64]) -> Self {
+        let mut values = point.iter().map(|x| x.clamp(-25.0, 15.0).exp());
+        let mut next = || values.next().unwrap_or(f64::NAN);
+        Self {
+            baseline_sd: next(),
+            baseline_time_s: next(),
+            reading_sd: next(),
+            branch_sd: next(),
+            rate_sd_per_s: next(),
+            rate_time_s: next(),
+            strain_sd: next(),
+            phases: (point.len() > OF_ALL).then(|| PhaseValues {
+                hold_time_s: next(),
+                move_time_s: next(),
+                speed_per_s: next(),
+                tempering: next(),
+            }),
+        }
+    }
+
+    /// The point of a search at these values.
+    fn point(&self) -> Vec<f64> {
+        let Self { baseline_sd, baseline_time_s, reading_sd, branch_sd, rate_sd_per_s, rate_time_s, strain_sd, phases } =
+            self;
+        let of_all: [_; OF_ALL] =
+            [baseline_sd, baseline_time_s, reading_sd, branch_sd, rate_sd_per_s, rate_time_s, strain_sd];
+        let of_phases = phases.iter().flat_map(|PhaseValues { hold_time_s, move_time_s, speed_per_s, tempering }| {
+            [hold_time_s, move_time_s, speed_per_s, tempering]
+        });
+        of_all.into_iter().chain(of_phases).map(|x| x.ln()).collect()
     }
 }
 

@@ -2,7 +2,7 @@
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use crate::calibrate::left_out::{Build, LeftOut, SaidFall};
+use crate::calibrate::left_out::{Build, LeftOut, PredictedFall};
 use crate::recording::holds::{Hold, LEAST_HOLD_S, holds};
 use crate::samples::Samples;
 use crate::sd_scale::Z_95;
@@ -26,7 +26,7 @@ struct Fall {
     /// Reading minus the last one of the hold.
     read: f64,
     /// Fall predicted by the law.
-    said: f64,
+    predicted: f64,
 }
 
 /// Long holds of the recordings.
@@ -66,9 +66,9 @@ impl LongHolds {
     /// The share is that of least squares, the deviations are those of maximum likelihood. Errors within one hold
     /// are alike, so that the number of holds determines the uncertainty for another hold: Student's t.
     pub(crate) fn settling(&self, left_out: &LeftOut, build: &Build) -> Option<SettlingParams> {
-        let fall = |of: SaidFall| {
+        let fall = |of: PredictedFall| {
             let place = self.rows[of.recording].binary_search(&of.row).ok()?;
-            Some(Fall { read: self.read[of.recording][place] / of.rest_reading, said: of.said })
+            Some(Fall { read: self.read[of.recording][place] / of.rest_reading, predicted: of.predicted })
         };
         let falls: Vec<Fall> = left_out.falls(build, &self.rows)?.into_iter().filter_map(fall).collect();
         (!falls.is_empty()).then(|| likeliest(&falls, self.count, self.longest_s))
@@ -89,16 +89,18 @@ fn rows_of(hold: &Hold, samples: &Samples) -> Vec<(usize, f64)> {
 
 /// Share and deviations of the rows of `count` holds.
 fn likeliest(falls: &[Fall], count: usize, horizon_s: f64) -> SettlingParams {
-    let squares: f64 = falls.iter().map(|fall| fall.said * fall.said).sum();
-    let products: f64 = falls.iter().map(|fall| fall.read * fall.said).sum();
+    let squares: f64 = falls.iter().map(|fall| fall.predicted * fall.predicted).sum();
+    let products: f64 = falls.iter().map(|fall| fall.read * fall.predicted).sum();
     let share = (products / squares.max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
     let usual = (squares / falls.len() as f64).sqrt().max(f64::MIN_POSITIVE);
-    // Squared errors, and squares of what was said in units of its usual size.
-    let errors: Vec<(f64, f64)> =
-        falls.iter().map(|fall| ((fall.read - share * fall.said).powi(2), (fall.said / usual).powi(2))).collect();
+    // Squared errors, and squares of the predicted falls in units of their usual size.
+    let errors: Vec<(f64, f64)> = falls
+        .iter()
+        .map(|fall| ((fall.read - share * fall.predicted).powi(2), (fall.predicted / usual).powi(2)))
+        .collect();
     let mean = |of: &dyn Fn(f64, f64) -> f64| errors.iter().map(|(e, s)| of(*e, *s)).sum::<f64>() / errors.len() as f64;
-    let constant = |ratio: f64| mean(&|error, said| error / (1.0 + ratio * ratio * said));
-    let cost = |ratio: &f64| constant(*ratio).ln() + mean(&|_, said| (ratio * ratio * said).ln_1p());
+    let constant = |ratio: f64| mean(&|error, predicted| error / (1.0 + ratio * ratio * predicted));
+    let cost = |ratio: &f64| constant(*ratio).ln() + mean(&|_, predicted| (ratio * ratio * predicted).ln_1p());
     let (steps, least, most) = RATIOS;
     let grid = (0..=steps).map(|k| least * (most / least).powf(f64::from(k) / f64::from(steps)));
     let ratio = std::iter::once(0.0).chain(grid).min_by(|a, b| cost(a).total_cmp(&cost(b))).unwrap_or(0.0);
@@ -122,9 +124,9 @@ mod tests {
     #[test]
     fn share_and_deviations_are_found() {
         let fall = |k: u32| {
-            let said = 0.4 * 0.7_f64.powi((k / 2) as i32);
+            let predicted = 0.4 * 0.7_f64.powi((k / 2) as i32);
             let sign = if k.is_multiple_of(2) { 1.0 } else { -1.0 };
-            Fall { read: said * 2.0 / 3.0 + sign * (0.1 * said).hypot(1e-3), said }
+            Fall { read: predicted * 2.0 / 3.0 + sign * (0.1 * predicted).hypot(1e-3), predicted }
         };
         let falls: Vec<Fall> = (0..60).map(fall).collect();
         let found = likeliest(&falls, 1000, 300.0);
@@ -135,7 +137,7 @@ mod tests {
 
     #[test]
     fn branches_that_say_nothing_leave_the_readings_own_fall() {
-        let falls: Vec<Fall> = [0.01, 0.03].map(|read| Fall { read, said: 0.0 }).into();
+        let falls: Vec<Fall> = [0.01, 0.03].map(|read| Fall { read, predicted: 0.0 }).into();
         let found = likeliest(&falls, 1_000_000, 60.0);
         assert_eq!((found.share, found.share_sd), (0.0, 0.0));
         // The quantile is good to 2e-5.

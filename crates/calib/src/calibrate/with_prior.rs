@@ -24,15 +24,15 @@ pub fn calibrate_with_prior(
     prior: Option<&Prior>,
     mut progress: impl FnMut(Stage),
 ) -> Result<Calibration, CalibrationError> {
-    let taught = calibrate_once(recordings, structures, kinds, prior, &mut progress);
+    let with_prior = calibrate_once(recordings, structures, kinds, prior, &mut progress);
     let longest_s = recordings.iter().map(Samples::duration_s).fold(0.0, f64::max);
     if prior.is_none_or(|prior| longest_s < ALONE * prior.validity.duration_s) {
-        return taught;
+        return with_prior;
     }
     let error = |made: &Calibration| made.findings.as_ref().map_or(f64::INFINITY, |findings| findings.filter.rmse);
-    match (taught, calibrate_once(recordings, structures, kinds, None, progress)) {
-        (Ok(taught), Ok(alone)) => Ok(if error(&alone) < error(&taught) { alone } else { taught }),
-        (Ok(taught), Err(_)) => Ok(taught),
+    match (with_prior, calibrate_once(recordings, structures, kinds, None, progress)) {
+        (Ok(with_prior), Ok(alone)) => Ok(if error(&alone) < error(&with_prior) { alone } else { with_prior }),
+        (Ok(with_prior), Err(_)) => Ok(with_prior),
         (Err(_), alone) => alone,
     }
 }

@@ -1,4 +1,4 @@
-use crate::product::product;
+use crate::dense::product;
 use nalgebra::{DMatrix, DVector};
 
 use super::datum::Datum;
@@ -80,7 +80,7 @@ pub(super) fn least_squares(basis: &DMatrix<f64>, response: &DVector<f64>) -> Op
     let (left, right) = (svd.u?, svd.v_t?);
     let rank = svd.singular_values.iter().filter(|value| **value > RANK * svd.singular_values[0]).count();
     // Singular values come in descending order.
-    let range = product(&q, &left.columns(0, rank));
+    let range = product(&q, left.columns(0, rank));
     let mut inner = range.tr_mul(response);
     for (value, singular) in inner.iter_mut().zip(svd.singular_values.iter()) {
         *value /= *singular;

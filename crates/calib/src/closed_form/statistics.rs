@@ -83,10 +83,10 @@ impl ClosedFormFit {
             None => projection.basis[(row, j)],
             Some(k) => projection.slopes[(row, k)],
         });
-        let told = Inverse::new(&jacobian, &at_limit);
+        let inverse = Inverse::new(&jacobian, &at_limit);
         let (n, p, residual_sum) = (data.len() as f64, at_limit.len() as f64, projection.cost());
         let variance = residual_sum / (n - p);
-        let covariance = told.covariance * variance;
+        let covariance = inverse.covariance * variance;
         let names = law.linear().into_iter().chain(law.nonlinear());
         let values = weights.iter().chain(theta);
         let parameters = names
@@ -120,7 +120,7 @@ impl ClosedFormFit {
             aicc: if n > k + 1.0 { fit + 2.0 * k * n / (n - k - 1.0) } else { f64::INFINITY },
             bic: fit + k * n.ln(),
             residual_autocorrelation: autocorrelation(&projection.residual),
-            condition: told.condition,
+            condition: inverse.condition,
             converged,
         }
     }

@@ -1,5 +1,7 @@
 //! Criterion by which the settings of a process are chosen.
 
+use crate::dense::inverse_diagonal;
+
 use super::gaussian_process::{BLOCKS, BlockLeftOut, GaussianProcess};
 
 /// Criterion that settings are chosen by: the larger, the better. Rows are closer in time than the correlation time of their errors,
@@ -35,7 +37,7 @@ impl LeftOutCosts {
             let triangle = precision.l();
             let half_log_determinant = -triangle.diagonal().iter().map(|pivot| pivot.ln()).sum::<f64>();
             of_blocks.add(errors.len(), triangle.tr_mul(&errors).norm_squared(), half_log_determinant);
-            for (error, variance) in errors.iter().zip(&precision.inverse().diagonal()) {
+            for (error, variance) in errors.iter().zip(inverse_diagonal(&precision)) {
                 of_rows.add(1, error * error / variance, 0.5 * variance.ln());
             }
         }

@@ -1,4 +1,4 @@
-use crate::product::product;
+use crate::dense::{cholesky, lower_inverse, product};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use ohmstrain_ekf::correction::kernel;
 use ohmstrain_sensor::correction::relevance;
@@ -25,7 +25,7 @@ pub(crate) struct Settings {
 
 /// Rows to learn from: standardised inputs, targets, times.
 #[derive(Clone, Copy)]
-pub(crate) struct Lessons<'a> {
+pub(crate) struct TrainingSet<'a> {
     pub inputs: &'a [&'a [f64]],
     pub targets: &'a [f64],
     pub time_s: &'a [f64],
@@ -40,6 +40,7 @@ pub(crate) struct GaussianProcess {
     pub scale: f64,
     /// Variance of the noise, in those of the prior.
     pub noise: f64,
+    /// Kernels of the rows with each other, in the lower triangle.
     kernel: DMatrix<f64>,
     covariance: Cholesky<f64, Dyn>,
     weights: DVector<f64>,
@@ -66,8 +67,8 @@ pub(super) struct BlockLeftOut {
     pub precision: Cholesky<f64, Dyn>,
 }
 
-impl Lessons<'_> {
-    /// `Σ (xᵢ - xᵢ')²/2ℓᵢ²` for all pairs of rows.
+impl TrainingSet<'_> {
+    /// `Σ (xᵢ - xᵢ')²/2ℓᵢ²` for all pairs of rows, in the lower triangle.
     pub(super) fn half_squares(self, lengths: &[f64]) -> DMatrix<f64> {
         let relevance: Vec<f64> = lengths.iter().map(|length| relevance(*length)).collect();
         let apart = |(a, b): (&f64, &f64)| (a - b).powi(2);
@@ -75,28 +76,53 @@ impl Lessons<'_> {
             let squares = self.inputs[i].iter().zip(self.inputs[j]).map(apart);
             squares.zip(&relevance).map(|(square, relevance)| square * relevance).sum()
         };
-        symmetric(self.inputs.len(), sum)
+        lower_triangle(self.inputs.len(), sum)
+    }
+
+    /// Kernels of the rows with each other, in the lower triangle, of sums by [`half_squares`](Self::half_squares).
+    pub(super) fn kernel(self, sums: &DMatrix<f64>) -> DMatrix<f64> {
+        lower_triangle(self.inputs.len(), |i, j| kernel(sums[(i, j)], self.inputs[i][0] * self.inputs[j][0]))
+    }
+}
+
+/// Noise of the targets.
+pub(super) struct Noise {
+    /// Standard deviation of the part that is correlated in time, relative to that of the targets.
+    pub sd: f64,
+    /// Correlation time, s.
+    pub time_s: f64,
+    /// Covariance, in variances of the targets, in the lower triangle.
+    covariance: DMatrix<f64>,
+}
+
+impl Noise {
+    pub(super) fn new(of: TrainingSet, sd: f64, time_s: f64) -> Self {
+        let variance = sd.powi(2);
+        let covariance = lower_triangle(of.time_s.len(), |i, j| {
+            let white = if i == j { WHITE * variance + JITTER } else { 0.0 };
+            variance * (-(of.time_s[i] - of.time_s[j]).abs() / time_s).exp() + white
+        });
+        Self { sd, time_s, covariance }
     }
 }
 
 impl GaussianProcess {
-    /// Conditions a process on rows; none if its covariance is not positive definite.
-    pub(crate) fn new(lessons: Lessons, params: &Settings) -> Option<Self> {
-        Self::with_sums(lessons, &lessons.half_squares(&params.lengths), params)
+    /// Conditions a process on rows; `None` if its covariance is not positive definite.
+    pub(crate) fn new(training: TrainingSet, params: &Settings) -> Option<Self> {
+        let kernel = training.kernel(&training.half_squares(&params.lengths));
+        Self::of_kernel(training.targets, kernel, &Noise::new(training, params.noise, params.noise_time_s))
     }
 
-    /// The same, of sums by [`Lessons::half_squares`].
-    pub(super) fn with_sums(lessons: Lessons, sums: &DMatrix<f64>, params: &Settings) -> Option<Self> {
-        let Lessons { inputs, targets, time_s } = lessons;
+    /// The same, of kernels by [`TrainingSet::kernel`].
+    pub(super) fn of_kernel(targets: &[f64], kernel: DMatrix<f64>, noise: &Noise) -> Option<Self> {
         let n = targets.len();
         let centre = targets.iter().sum::<f64>() / n as f64;
         let size = (targets.iter().map(|y| (y - centre).powi(2)).sum::<f64>() / n as f64).sqrt().max(f64::MIN_POSITIVE);
         let targets = DVector::from_iterator(n, targets.iter().map(|y| (y - centre) / size));
-        let kernel = symmetric(n, |i, j| kernel(sums[(i, j)], inputs[i][0] * inputs[j][0]));
-        let covariance = (&kernel + noise_covariance(time_s, params)).cholesky()?;
+        let covariance = cholesky(&kernel + &noise.covariance)?;
         let weights = covariance.solve(&targets);
         let scale = targets.dot(&weights) / n as f64;
-        let noise = (1.0 + WHITE) * params.noise.powi(2);
+        let noise = (1.0 + WHITE) * noise.sd.powi(2);
         Some(Self { centre, size, scale, noise, kernel, covariance, weights, targets })
     }
 
@@ -147,10 +173,10 @@ impl GaussianProcess {
         for block in (0..blocks).rev() {
             let (start, end) = (block * n / blocks, (block + 1) * n / blocks);
             let (len, later) = (end - start, n - end);
-            let own = triangle.view((start, start), (len, len)).solve_lower_triangular(&DMatrix::identity(len, len))?;
-            let below = product(&triangle.view((end, start), (later, len)), &-&own);
-            let below = product(&inverse.view((end, end), (later, later)), &below);
-            let precision = (product(&own.transpose(), &own) + product(&below.transpose(), &below)).cholesky()?;
+            let own = lower_inverse(&triangle.view((start, start), (len, len)));
+            let below = product(triangle.view((end, start), (later, len)), &own);
+            let below = -product(inverse.view((end, end), (later, later)), &below);
+            let precision = cholesky(product(&own.transpose(), &own) + product(&below.transpose(), &below))?;
             inverse.view_mut((start, start), (len, len)).copy_from(&own);
             inverse.view_mut((end, start), (later, len)).copy_from(&below);
             left_out.push(BlockLeftOut { start, errors: precision.solve(&self.weights.rows(start, len)), precision });
@@ -163,10 +189,12 @@ impl GaussianProcess {
     /// kernels are projected onto those of these inducing rows, k (Nyström).
     pub(crate) fn explained(&self, inducing: &[usize]) -> Option<Vec<f64>> {
         let m = inducing.len();
-        let with_inducing = self.kernel.select_columns(inducing);
+        let mut kernel = self.kernel.clone();
+        kernel.fill_upper_triangle_with_lower_triangle();
+        let with_inducing = kernel.select_columns(inducing);
         let among = with_inducing.select_rows(inducing) + DMatrix::identity(m, m) * JITTER * 1e-2;
         // Kernels of all rows as weighted sums of those of the inducing rows.
-        let projection = among.cholesky()?.solve(&with_inducing.transpose()).transpose();
+        let projection = cholesky(among)?.solve(&with_inducing.transpose()).transpose();
         let triangle = self.covariance.l_dirty().solve_lower_triangular(&projection)?.qr().r();
         Some((0..m).flat_map(|i| (i..m).map(move |j| (i, j))).map(|place| triangle[place]).collect())
     }
@@ -175,28 +203,18 @@ impl GaussianProcess {
 /// Kernels of rows with each other.
 pub(super) fn kernel_of(rows: &[Vec<f64>], settings: &Settings) -> DMatrix<f64> {
     let inputs: Vec<&[f64]> = rows.iter().map(Vec::as_slice).collect();
-    let sums = Lessons { inputs: &inputs, targets: &[], time_s: &[] }.half_squares(&settings.lengths);
-    symmetric(rows.len(), |i, j| kernel(sums[(i, j)], rows[i][0] * rows[j][0]))
+    let training = TrainingSet { inputs: &inputs, targets: &[], time_s: &[] };
+    let mut kernel = training.kernel(&training.half_squares(&settings.lengths));
+    kernel.fill_upper_triangle_with_lower_triangle();
+    kernel
 }
 
-/// Covariance of the noise, in variances of the targets.
-fn noise_covariance(time_s: &[f64], params: &Settings) -> DMatrix<f64> {
-    let variance = params.noise.powi(2);
-    symmetric(time_s.len(), |i, j| {
-        let white = if i == j { WHITE * variance + JITTER } else { 0.0 };
-        variance * (-(time_s[i] - time_s[j]).abs() / params.noise_time_s).exp() + white
-    })
-}
-
-/// Builds a symmetric matrix; `entry` is called for the lower triangle.
-pub(super) fn symmetric(n: usize, entry: impl Fn(usize, usize) -> f64) -> DMatrix<f64> {
+/// Builds the lower triangle of an n × n matrix; zeros are above it.
+pub(super) fn lower_triangle(n: usize, entry: impl Fn(usize, usize) -> f64) -> DMatrix<f64> {
     let mut matrix = DMatrix::zeros(n, n);
-    for j in 0..n {
-        for i in j..n {
-            matrix[(i, j)] = entry(i, j);
-        }
+    for (j, mut column) in matrix.column_iter_mut().enumerate() {
+        column.iter_mut().enumerate().skip(j).for_each(|(i, to)| *to = entry(i, j));
     }
-    matrix.fill_upper_triangle_with_lower_triangle();
     matrix
 }
 

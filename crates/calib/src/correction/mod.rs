@@ -52,7 +52,7 @@ pub(crate) fn filter_corrector(
     simulated: &SimulatedParams,
 ) -> Option<CorrectorParams> {
     let prepared = Prepared::new(examples);
-    Choices::fit::<_, 0>(&prepared, &prepared.heard(simulated))?.learned::<_, 0>(&prepared)
+    Choices::fit::<_, 0>(&prepared, &prepared.simulated_predictions(simulated))?.learned::<_, 0>(&prepared)
 }
 
 /// The same of a smoother, with its one-sided processes.
@@ -75,13 +75,13 @@ impl Choices {
 
     /// Returns the factor on the deviation of its processes' joint prediction.
     fn scale_of<const D: usize, const S: usize>(&self, prepared: &Prepared<D>, last: &[Gaussian<f64>]) -> Option<f64> {
-        let said = |kind: ProcessKind| prepared.left_out(kind, self.of(kind)?);
-        let (direct, residual) = (said(ProcessKind::Direct)?, said(ProcessKind::Residual)?);
-        let sides: Vec<_> = ONE_SIDED[..S].iter().map(|side| said(*side)).collect::<Option<_>>()?;
+        let predicted = |kind: ProcessKind| prepared.left_out(kind, self.of(kind)?);
+        let (direct, residual) = (predicted(ProcessKind::Direct)?, predicted(ProcessKind::Residual)?);
+        let sides: Vec<_> = ONE_SIDED[..S].iter().map(|side| predicted(*side)).collect::<Option<_>>()?;
         let one_sided = |k: usize| std::array::from_fn::<_, S, _>(|side| sides[side][k]);
         let together = |k: usize| consensus(direct[k], residual[k], one_sided(k));
-        let said: Vec<Gaussian<f64>> = (0..prepared.judged.rows.len()).map(together).collect();
-        Some(prepared.scale_beside(&said, last))
+        let predicted: Vec<Gaussian<f64>> = (0..prepared.judged.rows.len()).map(together).collect();
+        Some(prepared.scale_beside(&predicted, last))
     }
 
     /// Conditions the processes on the examples; none if a covariance is not positive definite.

@@ -8,7 +8,7 @@ use ohmstrain_sensor::correction::{ProcessKind, standardised};
 
 use super::criterion::Criterion;
 use super::examples::{AllRows, Examples};
-use super::gaussian_process::{BLOCKS, GaussianProcess, LeftOutRow, Lessons, Settings};
+use super::gaussian_process::{BLOCKS, GaussianProcess, LeftOutRow, Settings, TrainingSet};
 use super::sparse::{Population, Sums};
 use crate::order::extent;
 use crate::sd_scale::{joint_scale_of, sd_scale_up_to};
@@ -43,7 +43,7 @@ pub(super) struct Choosing {
 }
 
 impl Choosing {
-    /// Factors weigh voices against each other; the mixture's own sees to its interval. Of a filter's two voices one is not to be
+    /// Factors weigh members against each other; the mixture's own sees to its interval. Of a filter's two members one is not to be
     /// silenced everywhere by a block that is a world of its own. A smoother has four, one of which is mostly better: there the
     /// caution pays.
     pub(super) const fn of_sides(sides: usize) -> Self {
@@ -111,9 +111,13 @@ impl<'a, const D: usize> Prepared<'a, D> {
     }
 
     /// Calls `learn` with the examples of a process.
-    fn taught<X>(&self, (kind, places): (ProcessKind, &[usize]), learn: impl Fn(Lessons) -> Option<X>) -> Option<X> {
+    fn with_training_set<X>(
+        &self,
+        (kind, places): (ProcessKind, &[usize]),
+        learn: impl Fn(TrainingSet) -> Option<X>,
+    ) -> Option<X> {
         let (inputs, targets) = (seen(places, &self.rows), targets(kind, self.examples.inputs, self.examples.strain));
-        learn(Lessons { inputs: &as_slices(&inputs), targets: &targets, time_s: self.examples.time_s })
+        learn(TrainingSet { inputs: &as_slices(&inputs), targets: &targets, time_s: self.examples.time_s })
     }
 
     /// Sums over all rows of several recordings; `None` if there are not several.
@@ -129,7 +133,7 @@ impl<'a, const D: usize> Prepared<'a, D> {
     /// there are several.
     pub(super) fn chosen(&self, kind: ProcessKind, by: Choosing) -> Option<Chosen> {
         let inputs = kind.places(D);
-        let settings = self.taught((kind, &inputs), |lessons| lessons.best_settings(by.criterion))?;
+        let settings = self.with_training_set((kind, &inputs), |training| training.best_settings(by.criterion))?;
         let settings = match self.examples.all {
             Some(_) => self.best_of_recordings((kind, &inputs), &settings)?,
             None => settings,
@@ -166,32 +170,35 @@ impl<'a, const D: usize> Prepared<'a, D> {
                 let rows = sums.left_out(*noise)?.into_iter().map(of_variance).collect();
                 LeftOut { rows, noise: Sums::unpredicted(*noise) * variance }
             }
-            None => self.taught(of, |lessons| {
-                let process = GaussianProcess::new(lessons, &chosen.settings)?;
+            None => self.with_training_set(of, |training| {
+                let process = GaussianProcess::new(training, &chosen.settings)?;
                 Some(LeftOut { rows: process.left_out(BLOCKS)?, noise: process.noise * process.variance() })
             })?,
         };
         let (limits, least) = (self.examples.limits, self.least_variance(kind));
-        let said = |(k, row): (usize, LeftOutRow)| {
+        let predicted = |(k, row): (usize, LeftOutRow)| {
             let variance = row.unknown * row.prior.max(least) + noise;
             let mean = (base(kind, &self.judged.inputs[k]) + row.mean).clamp(limits.lower, limits.upper);
             Gaussian { mean, variance: variance * chosen.sd_scale.powi(2) }
         };
-        Some(rows.into_iter().enumerate().map(said).collect())
+        Some(rows.into_iter().enumerate().map(predicted).collect())
     }
 
     /// Returns the errors of the predictions of judged rows, in units of their deviations, block by block.
-    fn deviations(&self, said: &[Gaussian<f64>]) -> Vec<Vec<f64>> {
-        let of_row = |k: usize| (said[k].mean - self.judged.strain[k]).hypot(self.examples.reference_sd) / said[k].sd();
+    fn deviations(&self, predicted: &[Gaussian<f64>]) -> Vec<Vec<f64>> {
+        let of_row = |k: usize| {
+            (predicted[k].mean - self.judged.strain[k]).hypot(self.examples.reference_sd) / predicted[k].sd()
+        };
         self.judged.blocks.iter().map(|block| block.clone().map(of_row).collect()).collect()
     }
 
-    /// Returns the factor on the deviation of the predictions of judged rows that makes intervals right, beside the voice mixed in last.
-    pub(super) fn scale_beside(&self, said: &[Gaussian<f64>], last: &[Gaussian<f64>]) -> f64 {
+    /// Returns the factor on the deviation of the predictions of judged rows that makes intervals right, beside the member mixed in last.
+    pub(super) fn scale_beside(&self, predicted: &[Gaussian<f64>], last: &[Gaussian<f64>]) -> f64 {
         joint_scale_of(|scale| {
-            let scaled = |said: &Gaussian<f64>| Gaussian { variance: said.variance * scale.powi(2), ..*said };
-            let heard = |(k, of_row)| mixture(std::iter::once(scaled(of_row)).chain(last.get(k).copied()));
-            let mixed: Vec<Gaussian<f64>> = said.iter().enumerate().map(heard).collect();
+            let scaled =
+                |predicted: &Gaussian<f64>| Gaussian { variance: predicted.variance * scale.powi(2), ..*predicted };
+            let mixed_with = |(k, of_row)| mixture(std::iter::once(scaled(of_row)).chain(last.get(k).copied()));
+            let mixed: Vec<Gaussian<f64>> = predicted.iter().enumerate().map(mixed_with).collect();
             self.deviations(&mixed).concat()
         })
     }
@@ -208,7 +215,7 @@ impl<'a, const D: usize> Prepared<'a, D> {
             let known = Known::All(sums, settings.noise);
             return Some(Conditioned { weights, variance, noise, known });
         }
-        let process = self.taught((kind, inputs), |lessons| GaussianProcess::new(lessons, settings))?;
+        let process = self.with_training_set((kind, inputs), |training| GaussianProcess::new(training, settings))?;
         let (weights, variance) = (process.weights().collect(), process.variance());
         Some(Conditioned { weights, variance, noise: process.noise * variance, known: Known::Examples(process) })
     }

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use super::criterion::Criterion;
 use ohmstrain_sensor::correction::relevance;
 
-use super::gaussian_process::{GaussianProcess, Lessons, Settings, symmetric};
+use super::gaussian_process::{GaussianProcess, Noise, Settings, TrainingSet, lower_triangle};
 
 /// Length scales, of all inputs alike, noises and correlation times tried: coarse, since a few hundred rows whose errors hang
 /// together tell no more.
@@ -21,7 +21,7 @@ const SPREAD: f64 = 2.0;
 const LEAST_STRETCH: f64 = 0.25;
 const MOST_STRETCH: f64 = 8.0;
 
-impl Lessons<'_> {
+impl TrainingSet<'_> {
     /// The settings that are best by a criterion times the prior of the length scales; none if no covariance is positive
     /// definite.
     pub(crate) fn best_settings(self, criterion: Criterion) -> Option<Settings> {
@@ -32,29 +32,30 @@ impl Lessons<'_> {
     fn alike(self, criterion: Criterion) -> Option<(f64, Settings)> {
         let inputs = self.inputs.first()?.len();
         let squares = self.half_squares(&vec![1.0; inputs]);
-        let mut best: Option<(f64, Settings)> = None;
+        let noises = NOISES.into_iter().flat_map(|noise| NOISE_TIMES_S.map(|time_s| Noise::new(self, noise, time_s)));
+        let noises: Vec<Noise> = noises.collect();
+        let mut best: Option<(f64, f64, &Noise)> = None;
         for length in LENGTHS {
-            let sums = &squares / (length * length);
-            for noise in NOISES {
-                for noise_time_s in NOISE_TIMES_S {
-                    let lengths = vec![length; inputs];
-                    let params = Settings { lengths, noise, noise_time_s };
-                    let Some(cost) = self.cost(criterion, &sums, &params) else { continue };
-                    if best.as_ref().is_none_or(|(least, _)| cost < *least) {
-                        best = Some((cost, params));
-                    }
+            let kernel = self.kernel(&(&squares / (length * length)));
+            for noise in &noises {
+                let Some(cost) = self.cost(criterion, kernel.clone(), noise) else { continue };
+                if best.is_none_or(|(least, ..)| cost < least) {
+                    best = Some((cost, length, noise));
                 }
             }
         }
-        best
+        best.map(|(cost, length, Noise { sd, time_s, .. })| {
+            (cost, Settings { lengths: vec![length; inputs], noise: *sd, noise_time_s: *time_s })
+        })
     }
 
     /// Automatic relevance determination (Neal, *Bayesian Learning for Neural Networks*, 1996): inputs that tell little get long
     /// length scales. Coordinates in turn, since a step of one is all that a few hundred rows can tell.
     fn with_relevance(self, criterion: Criterion, cost: f64, params: Settings) -> Settings {
         let inputs = params.lengths.len();
-        let mut search =
-            RelevanceSearch { lessons: self, criterion, sums: self.half_squares(&params.lengths), params, cost };
+        let noise = Noise::new(self, params.noise, params.noise_time_s);
+        let sums = self.half_squares(&params.lengths);
+        let mut search = RelevanceSearch { training: self, criterion, noise, sums, params, cost };
         for input in (1..inputs).cycle().take(TURNS * (inputs - 1)) {
             // Shorter for as long as it pays; if it does not at all, longer.
             let shorter = (0..).take_while(|_| search.step(input, 1.0 / STRETCH)).count();
@@ -63,24 +64,25 @@ impl Lessons<'_> {
         search.params
     }
 
-    fn cost(self, criterion: Criterion, sums: &DMatrix<f64>, params: &Settings) -> Option<f64> {
-        criterion.cost(&GaussianProcess::with_sums(self, sums, params)?)
+    fn cost(self, criterion: Criterion, kernel: DMatrix<f64>, noise: &Noise) -> Option<f64> {
+        criterion.cost(&GaussianProcess::of_kernel(self.targets, kernel, noise)?)
     }
 
     /// Returns the sums with another length scale of one input.
     fn stretched(self, sums: &DMatrix<f64>, input: usize, from: f64, to: f64) -> DMatrix<f64> {
         let change = relevance(to) - relevance(from);
         let apart = |i: usize, j: usize| self.inputs[i][input] - self.inputs[j][input];
-        symmetric(self.inputs.len(), |i, j| sums[(i, j)] + change * apart(i, j).powi(2))
+        lower_triangle(self.inputs.len(), |i, j| sums[(i, j)] + change * apart(i, j).powi(2))
     }
 }
 
 /// Settings on the way to better ones.
 struct RelevanceSearch<'a> {
-    lessons: Lessons<'a>,
+    training: TrainingSet<'a>,
     criterion: Criterion,
+    noise: Noise,
     params: Settings,
-    /// `Σ (xᵢ - xᵢ')²/2ℓᵢ²` for all pairs of rows.
+    /// `Σ (xᵢ - xᵢ')²/2ℓᵢ²` for all pairs of rows, in the lower triangle.
     sums: DMatrix<f64>,
     /// Negative logarithm of criterion and prior.
     cost: f64,
@@ -94,11 +96,12 @@ impl RelevanceSearch<'_> {
         if !(LEAST_STRETCH * alike..=MOST_STRETCH * alike).contains(&trial) {
             return false;
         }
-        let sums = self.lessons.stretched(&self.sums, input, now, trial);
+        let sums = self.training.stretched(&self.sums, input, now, trial);
         self.params.lengths[input] = trial;
         let prior = |length: &f64| 0.5 * ((length / alike).ln() / SPREAD.ln()).powi(2);
         let priors: f64 = self.params.lengths.iter().map(prior).sum();
-        let cost = self.lessons.cost(self.criterion, &sums, &self.params).map_or(f64::INFINITY, |cost| cost + priors);
+        let cost = self.training.cost(self.criterion, self.training.kernel(&sums), &self.noise);
+        let cost = cost.map_or(f64::INFINITY, |cost| cost + priors);
         let is_better = cost < self.cost;
         if is_better {
             (self.cost, self.sums) = (cost, sums);

@@ -54,9 +54,12 @@ impl Distilled {
         let inputs: Vec<[f64; FEATURES]> = simulated.iter().map(on_scale).collect();
         let inputs: Vec<&[f64]> = inputs.iter().map(|row| &row[..]).collect();
         let strain: Vec<f64> = simulated.iter().map(|row| row.strain).collect();
-        let (said, sd) = distilled(&inputs, &strain, centre(limits))?;
-        let row = |(k, said): (usize, f64)| SimulatedRow { past: simulated[k].past.map(digits), strain: digits(said) };
-        Some(Self { sd: digits(sd), rows: chosen(simulated.len()).zip(said).map(row).collect() })
+        let (predicted, sd) = distilled(&inputs, &strain, centre(limits))?;
+        let row = |(k, predicted): (usize, f64)| SimulatedRow {
+            past: simulated[k].past.map(digits),
+            strain: digits(predicted),
+        };
+        Some(Self { sd: digits(sd), rows: chosen(simulated.len()).zip(predicted).map(row).collect() })
     }
 }
 
@@ -111,25 +114,26 @@ impl Prepared<'_, FILTER_INPUTS> {
         let regular = kernels(&own, &own) + DMatrix::identity(own.len(), own.len()) * JITTER;
         let weights = regular.cholesky()?.solve(&from_centre(&strain, mean));
         let weights: Vec<f64> = weights.iter().map(|x| weight(*x)).collect();
-        let said = self.said(&rows, &weights);
-        let squares: Vec<f64> = said.zip(self.judged.strain).map(|(said, strain)| (said - strain).powi(2)).collect();
+        let predicted = self.predictions(&rows, &weights);
+        let squares: Vec<f64> =
+            predicted.zip(self.judged.strain).map(|(predicted, strain)| (predicted - strain).powi(2)).collect();
         let of_block = |block: &Range<usize>| squares[block.clone()].iter().sum::<f64>() / block.len() as f64;
         let worst = self.judged.blocks.iter().map(of_block).fold(0.0, f64::max);
         Some(SimulatedParams { mean, sd: (of.sd.powi(2) + worst).sqrt(), length: LENGTH, weights, rows })
     }
 
     /// Prediction of each judged row from the simulated ones.
-    pub(super) fn heard(&self, of: &SimulatedParams) -> Vec<Gaussian<f64>> {
+    pub(super) fn simulated_predictions(&self, of: &SimulatedParams) -> Vec<Gaussian<f64>> {
         let variance = of.sd.powi(2);
-        self.said(&of.rows, &of.weights).map(|mean| Gaussian { mean, variance }).collect()
+        self.predictions(&of.rows, &of.weights).map(|mean| Gaussian { mean, variance }).collect()
     }
 
-    fn said(&self, rows: &[[f64; FEATURES]], weights: &[f64]) -> impl Iterator<Item = f64> {
+    fn predictions(&self, rows: &[[f64; FEATURES]], weights: &[f64]) -> impl Iterator<Item = f64> {
         let limits = self.examples.limits;
         let rows = self.simulated_rows(rows);
-        let said = kernels(&features(&self.judged.rows), &features(&rows)) * DVector::from_column_slice(weights);
+        let predicted = kernels(&features(&self.judged.rows), &features(&rows)) * DVector::from_column_slice(weights);
         let centre = centre(limits);
-        (0..self.judged.rows.len()).map(move |k| (centre + said[k]).clamp(limits.lower, limits.upper))
+        (0..self.judged.rows.len()).map(move |k| (centre + predicted[k]).clamp(limits.lower, limits.upper))
     }
 
     fn simulated_rows(&self, rows: &[[f64; FEATURES]]) -> Vec<[f64; FILTER_INPUTS]> {

@@ -5,7 +5,7 @@
 //! and the state that it began in are its own. Settings and factors are judged by recordings left out: within one recording
 //! neighbours share what another day does not have.
 
-use crate::product::product;
+use crate::dense::product;
 use std::ops::Range;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
@@ -144,21 +144,21 @@ impl Sums {
     pub(super) fn left_out(&self, noise: f64) -> Option<Vec<LeftOutRow>> {
         let m = self.few.nrows();
         let among = self.few.clone().cholesky()?.inverse();
-        let mut said = Vec::with_capacity(self.targets.len());
+        let mut predicted = Vec::with_capacity(self.targets.len());
         for (own, rows) in self.own.iter().zip(&self.recordings) {
             let factor = self.factor(noise, Some(own))?;
             let weights = factor.solve(&(&self.all.right - &own.right));
             let known = &among - factor.inverse().view((0, 0), (m, m)) * Self::white(noise);
             let kernels = self.kernels.rows(rows.start, rows.len());
-            let (means, weighted) = (kernels * weights.rows(0, m), product(&kernels, &known));
-            said.extend(rows.clone().enumerate().map(|(k, row)| {
+            let (means, weighted) = (kernels * weights.rows(0, m), product(kernels, &known));
+            predicted.extend(rows.clone().enumerate().map(|(k, row)| {
                 let explained = weighted.row(k).dot(&kernels.row(k));
                 let prior = self.priors[row];
                 let unknown = ((prior - explained) / prior).clamp(0.0, 1.0);
                 LeftOutRow { mean: self.centre + self.size * means[k], unknown, prior }
             }));
         }
-        Some(said)
+        Some(predicted)
     }
 
     /// The negative logarithm of the density of a row without its recording, with the prior variance that makes it least, up to a

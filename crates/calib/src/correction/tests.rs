@@ -4,7 +4,7 @@ use ohmstrain_ekf::Gaussian;
 use super::criterion::Criterion;
 use super::prepared::{Choosing, scale};
 use super::{AllRows, Choices, Chosen, Examples, Prepared};
-use crate::correction::gaussian_process::{GaussianProcess, Lessons, Settings};
+use crate::correction::gaussian_process::{GaussianProcess, Settings, TrainingSet};
 use ohmstrain_sensor::RangeParams;
 use ohmstrain_sensor::correction::{OwnedCorrection, ProcessKind};
 
@@ -103,7 +103,7 @@ fn a_correction_says_what_the_textbook_says() {
     for k in 0..39 {
         // Between two rows, within the range of all.
         let input: [f64; D] = std::array::from_fn(|i| 0.5 * (inputs[k][i] + inputs[k + 1][i]));
-        let said = correction.correction().correct(&input, Gaussian { mean: input[0], variance: 0.0 }, 1.0);
+        let predicted = correction.correction().correct(&input, Gaussian { mean: input[0], variance: 0.0 }, 1.0);
         let least = |book: &Textbook, share: f64| {
             let variance =
                 strain.iter().map(|x| x * x).sum::<f64>() / 40.0 - (strain.iter().sum::<f64>() / 40.0).powi(2);
@@ -112,12 +112,12 @@ fn a_correction_says_what_the_textbook_says() {
         // Matrices of condition 1e6, and what keeps the 40 kernels apart: 1e-8.
         let close = |a: f64, b: f64| (a - b).abs() < 1e-6;
         let book = textbook(&features, &strain, &time_s, &direct, &input[6..]);
-        assert!(close(said.direct.mean, book.mean), "{k}: {} {}", said.direct.mean, book.mean);
-        assert!(close(said.direct.variance, 2.25 * (least(&book, 0.5) + book.noise)), "{k}");
+        assert!(close(predicted.direct.mean, book.mean), "{k}: {} {}", predicted.direct.mean, book.mean);
+        assert!(close(predicted.direct.variance, 2.25 * (least(&book, 0.5) + book.noise)), "{k}");
         let book = textbook(&all, &residuals, &time_s, &residual, &input);
-        assert!(close(said.residual.mean, input[0] + book.mean), "{k}");
-        assert!(close(said.residual.variance, least(&book, 0.07) + book.noise), "{k}");
-        assert!(close(1.0 - said.novelty, 1.0 - book.latent / book.prior), "{k}");
+        assert!(close(predicted.residual.mean, input[0] + book.mean), "{k}");
+        assert!(close(predicted.residual.variance, least(&book, 0.07) + book.noise), "{k}");
+        assert!(close(1.0 - predicted.novelty, 1.0 - book.latent / book.prior), "{k}");
     }
 }
 
@@ -148,13 +148,13 @@ fn one_sided_processes_see_their_side_alone() {
     let futures: Vec<Vec<f64>> = inputs.iter().map(of_future).collect();
     for k in 0..39 {
         let input: [f64; BOTH] = std::array::from_fn(|i| 0.5 * (inputs[k][i] + inputs[k + 1][i]));
-        let said = correction.correction().correct(&input, Gaussian { mean: input[0], variance: 0.0 }, 1.0);
+        let predicted = correction.correction().correct(&input, Gaussian { mean: input[0], variance: 0.0 }, 1.0);
         let books = [
             textbook(&pasts, &strain, &time_s, &past.settings, &of_past(&input)),
             textbook(&futures, &strain, &time_s, &future.settings, &of_future(&input)),
         ];
-        for (said, book) in said.one_sided.iter().zip(books) {
-            assert!((said.mean - book.mean).abs() < 1e-6, "{k}: {} {}", said.mean, book.mean);
+        for (predicted, book) in predicted.one_sided.iter().zip(books) {
+            assert!((predicted.mean - book.mean).abs() < 1e-6, "{k}: {} {}", predicted.mean, book.mean);
         }
     }
 }
@@ -178,10 +178,10 @@ fn inducing_rows_cost_no_certainty_that_is_not_there() {
     let residuals: Vec<f64> = inputs.iter().zip(&strain).map(|(row, strain)| strain - row[0]).collect();
     for k in (0..199).step_by(7) {
         let input: [f64; D] = std::array::from_fn(|i| 0.5 * (inputs[k][i] + inputs[k + 1][i]));
-        let said = correction.correction().correct(&input, Gaussian { mean: input[0], variance: 0.0 }, 1.0);
+        let predicted = correction.correction().correct(&input, Gaussian { mean: input[0], variance: 0.0 }, 1.0);
         let book = textbook(&all, &residuals, &time_s, &settings, &input);
-        assert!((said.residual.mean - input[0] - book.mean).abs() < 1e-6, "{k}");
-        assert!(said.novelty > book.latent / book.prior - 1e-6, "{k}");
+        assert!((predicted.residual.mean - input[0] - book.mean).abs() < 1e-6, "{k}");
+        assert!(predicted.novelty > book.latent / book.prior - 1e-6, "{k}");
     }
 }
 
@@ -198,7 +198,7 @@ fn inputs_that_tell_nothing_get_long_length_scales() {
     let (learned, others) = (0..100, 100..160);
     let inputs: Vec<&[f64]> = rows[learned.clone()].iter().map(Vec::as_slice).collect();
     let (targets, times) = (&target[learned.clone()], &time_s[learned.clone()]);
-    let lessons = Lessons { inputs: &inputs, targets, time_s: times };
+    let training = TrainingSet { inputs: &inputs, targets, time_s: times };
     let error = |settings: Settings| -> f64 {
         let of = |k: usize| textbook(&rows[learned.clone()], targets, times, &settings, &rows[k]).mean - target[k];
         others.clone().map(|k| of(k).powi(2)).sum()
@@ -206,7 +206,7 @@ fn inputs_that_tell_nothing_get_long_length_scales() {
     let alike = |length: f64| error(Settings { lengths: vec![length; D], ..SETTINGS });
     let best_alike = [1.0, 2.0, 4.0, 8.0].map(alike).into_iter().fold(f64::INFINITY, f64::min);
     for criterion in [Criterion::LeftOutAndEvidence, Criterion::LeftOut] {
-        let found = lessons.best_settings(criterion).unwrap();
+        let found = training.best_settings(criterion).unwrap();
         let tells_most = |(i, length): (usize, &f64)| i == 0 || i == 2 || *length > found.lengths[2];
         assert!(found.lengths.iter().enumerate().all(tells_most), "{criterion:?}: {:?}", found.lengths);
         let relevant = error(found);
@@ -221,7 +221,7 @@ fn blocks_left_out_are_predicted_from_the_others() {
     let rows: Vec<&[f64]> = inputs.iter().map(|row| row.as_slice()).collect();
     let settings = Settings { lengths: vec![4.0; D], noise: 0.1, noise_time_s: 2.0 };
     let process =
-        GaussianProcess::new(Lessons { inputs: &rows, targets: &strain, time_s: &time_s }, &settings).unwrap();
+        GaussianProcess::new(TrainingSet { inputs: &rows, targets: &strain, time_s: &time_s }, &settings).unwrap();
     let left_out = process.left_out(5).unwrap();
     let kernel = |a: &[f64], b: &[f64]| {
         let square: f64 = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum();
@@ -272,7 +272,7 @@ fn settings_are_judged_by_evidence_and_by_what_was_left_out() {
     const ROWS: usize = 23;
     let (inputs, strain, time_s) = examples::<D>(ROWS, 1.7);
     let rows: Vec<&[f64]> = inputs.iter().map(|row| row.as_slice()).collect();
-    let lessons = Lessons { inputs: &rows, targets: &strain, time_s: &time_s };
+    let training = TrainingSet { inputs: &rows, targets: &strain, time_s: &time_s };
     let mean = strain.iter().sum::<f64>() / ROWS as f64;
     let sd = (strain.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / ROWS as f64).sqrt();
     let y = DVector::from_iterator(ROWS, strain.iter().map(|y| (y - mean) / sd));
@@ -314,7 +314,7 @@ fn settings_are_judged_by_evidence_and_by_what_was_left_out() {
     });
     let expected = settings.each_ref().map(naive);
     for (place, criterion) in [Criterion::LeftOutAndEvidence, Criterion::LeftOut].into_iter().enumerate() {
-        let cost = |of: &Settings| criterion.cost(&GaussianProcess::new(lessons, of).unwrap()).unwrap();
+        let cost = |of: &Settings| criterion.cost(&GaussianProcess::new(training, of).unwrap()).unwrap();
         let differ = cost(&settings[0]) - cost(&settings[1]);
         // Matrices of condition 1e5, and a minimum that is found where a function is flat to the last digit.
         assert!(
@@ -342,10 +342,10 @@ fn a_factor_covers_the_worst_block_or_all_together() {
     let covered = |covers_worst: bool| {
         let by = Choosing { criterion: Criterion::LeftOut, covers_worst };
         let params = prepared.chosen(ProcessKind::Residual, by).unwrap();
-        let said = prepared.left_out(ProcessKind::Residual, &params).unwrap();
+        let predicted = prepared.left_out(ProcessKind::Residual, &params).unwrap();
         // Neither of the factor's limits.
         assert!(params.sd_scale > 1.01 && params.sd_scale < 2.99, "{}", params.sd_scale);
-        let is_covered = |k: &usize| (said[*k].mean - strain[*k]).abs() <= 1.959964 * said[*k].sd();
+        let is_covered = |k: &usize| (predicted[*k].mean - strain[*k]).abs() <= 1.959964 * predicted[*k].sd();
         [0, 1, 2, 3, 4].map(|block| (32 * block..32 * (block + 1)).filter(is_covered).count())
     };
     let worst = covered(true);
@@ -370,20 +370,20 @@ fn learning_helps_near_and_leaves_far_alone() {
     let (mut before, mut after, mut covered) = (0.0, 0.0, 0);
     for k in (1..160).step_by(2) {
         let filtered = Gaussian { mean: inputs[k][0], variance: 0.01 };
-        let said = correction.correction().correct(&inputs[k], filtered, 1.0).strain;
+        let predicted = correction.correction().correct(&inputs[k], filtered, 1.0).strain;
         before += (inputs[k][0] - strain[k]).powi(2);
-        after += (said.mean - strain[k]).powi(2);
-        covered += u32::from((said.mean - strain[k]).abs() <= 1.96 * said.sd());
+        after += (predicted.mean - strain[k]).powi(2);
+        covered += u32::from((predicted.mean - strain[k]).abs() <= 1.96 * predicted.sd());
     }
     // The error of the filter is a function of the inputs; noise there is none.
     assert!(after < 0.04 * before, "{after} {before}");
     assert!(covered >= 72, "{covered} of 80");
     let mut far = inputs[80].map(|x| x + 100.0);
     far[0] = 0.3;
-    let said = correction.correction().correct(&far, Gaussian { mean: 0.3, variance: 0.01 }, 1.0);
-    assert!(said.novelty > 0.99);
+    let predicted = correction.correction().correct(&far, Gaussian { mean: 0.3, variance: 0.01 }, 1.0);
+    assert!(predicted.novelty > 0.99);
     // The strain has a deviation of 0.7; six per cent of its variance are allowed for at the least.
-    assert!(said.strain.sd() > 0.17, "{}", said.strain.sd());
+    assert!(predicted.strain.sd() > 0.17, "{}", predicted.strain.sd());
 }
 
 /// Three recordings of the same function, each with an offset of its own; `few` of their rows stand for all.
@@ -455,13 +455,13 @@ fn a_few_rows_learn_what_all_recordings_say() {
         // Of weights of kernels that are nearly alike only the sum is known; the equations are kept regular by 1e-9.
         assert!((found - expected).abs() < 1e-5, "{found} {expected}");
     }
-    let said = prepared.left_out(ProcessKind::Direct, &chosen).unwrap();
+    let predicted = prepared.left_out(ProcessKind::Direct, &chosen).unwrap();
     for (g, others) in [[1, 2], [0, 2], [0, 1]].iter().enumerate() {
         let (weights, covariance) = posterior(others);
         for k in recordings[g].clone() {
             let of_row = DVector::from_fn(15, |j, _| if j < 12 { kernel(z(&inputs[k]), z(&few[j])) } else { 0.0 });
             let expected = mean + size * of_row.dot(&weights);
-            assert!((said[k].mean - expected).abs() < 1e-5, "{k}: {} {expected}", said[k].mean);
+            assert!((predicted[k].mean - expected).abs() < 1e-5, "{k}: {} {expected}", predicted[k].mean);
             // A row far from the few is not known because these are: what no kernel explains is added.
             let kernels = of_row.rows(0, 12).into_owned();
             let among = regular.view((0, 0), (12, 12)).into_owned().try_inverse().unwrap();
@@ -472,7 +472,7 @@ fn a_few_rows_learn_what_all_recordings_say() {
                 * (strain[..12].iter().map(|x| x * x).sum::<f64>() / 12.0
                     - (strain[..12].iter().sum::<f64>() / 12.0).powi(2));
             let expected = unknown * (prior * direct.variance).max(least) + direct.noise;
-            assert!((said[k].variance - expected).abs() < 1e-5, "{k}: {} {expected}", said[k].variance);
+            assert!((predicted[k].variance - expected).abs() < 1e-5, "{k}: {} {expected}", predicted[k].variance);
         }
     }
 }

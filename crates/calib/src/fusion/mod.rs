@@ -7,7 +7,7 @@ mod regressions;
 
 use std::collections::HashMap;
 
-use ohmstrain_sensor::fusion::{FUSION_FORMAT, FusionParams, Voice};
+use ohmstrain_sensor::fusion::{FUSION_FORMAT, FusionParams, Member};
 use ohmstrain_sensor::{Quantity, RangeParams, Scores};
 
 use crate::CalibrationError;
@@ -17,7 +17,7 @@ use crate::motion_stats::MotionStats;
 use crate::samples::Samples;
 use crate::sd_scale::sd_scale;
 use neighbours::Neighbours;
-use readings::{Readings, Row};
+use readings::{Readings, ReadingsRow};
 
 /// Blocks of each recording, left out one after another.
 const BLOCKS: usize = 4;
@@ -84,10 +84,10 @@ pub fn fit_fusion(
         return Ok(FusionFit { params, fused: None, channels: vec![None; channels.len()] });
     }
     let covariance = covariance(&judged);
-    let with = |voices: usize| {
+    let with = |members: usize| {
         let params = FusionParams {
-            error_covariance: covariance[..voices].iter().map(|of_voice| of_voice[..voices].to_vec()).collect(),
-            regressions: params.regressions[..voices - channels.len()].to_vec(),
+            error_covariance: covariance[..members].iter().map(|of_member| of_member[..members].to_vec()).collect(),
+            regressions: params.regressions[..members - channels.len()].to_vec(),
             ..params.clone()
         };
         scaled(params, &judged, &neighbours)
@@ -99,21 +99,21 @@ pub fn fit_fusion(
         channels_only
     };
     let fused = score(&judged, &fused(&params, &judged, &neighbours));
-    let of_channel = |channel| score(&judged, &judged.iter().map(|one| Some(one.voices[channel])).collect::<Vec<_>>());
+    let of_channel = |channel| score(&judged, &judged.iter().map(|one| Some(one.members[channel])).collect::<Vec<_>>());
     Ok(FusionFit { fused, channels: (0..channels.len()).map(of_channel).collect(), params })
 }
 
 /// Fused estimates of judged rows.
-fn fused(params: &FusionParams, judged: &[Judged], neighbours: &Neighbours) -> Vec<Option<Voice>> {
-    let voices = params.error_covariance.len();
-    judged.iter().map(|one| params.fused(&one.voices[..voices], neighbours.excess(one.row.place))).collect()
+fn fused(params: &FusionParams, judged: &[Judged], neighbours: &Neighbours) -> Vec<Option<Member>> {
+    let members = params.error_covariance.len();
+    judged.iter().map(|one| params.fused(&one.members[..members], neighbours.excess(one.row.place))).collect()
 }
 
 /// The parameters with the factor that makes the fused interval cover the worst block.
 fn scaled(params: FusionParams, judged: &[Judged], neighbours: &Neighbours) -> FusionParams {
     let mut blocks = vec![Vec::new(); BLOCKS];
-    for (one, voice) in judged.iter().zip(fused(&params, judged, neighbours)) {
-        blocks[one.row.block].extend(voice.map(|voice| (voice.strain - one.row.seen.strain).abs() / voice.sd));
+    for (one, member) in judged.iter().zip(fused(&params, judged, neighbours)) {
+        blocks[one.row.block].extend(member.map(|member| (member.strain - one.row.seen.strain).abs() / member.sd));
     }
     FusionParams { sd_scale: sd_scale(&blocks), ..params }
 }
@@ -121,9 +121,9 @@ fn scaled(params: FusionParams, judged: &[Judged], neighbours: &Neighbours) -> F
 /// Mean negative log density of the strain under the fused estimate.
 fn log_loss(params: &FusionParams, judged: &[Judged], neighbours: &Neighbours) -> f64 {
     let fused = fused(params, judged, neighbours);
-    let losses = judged.iter().zip(&fused).map(|(one, voice)| {
-        let loss = |voice: &Voice| 0.5 * ((voice.strain - one.row.seen.strain) / voice.sd).powi(2) + voice.sd.ln();
-        voice.as_ref().map_or(f64::INFINITY, loss)
+    let losses = judged.iter().zip(&fused).map(|(one, member)| {
+        let loss = |member: &Member| 0.5 * ((member.strain - one.row.seen.strain) / member.sd).powi(2) + member.sd.ln();
+        member.as_ref().map_or(f64::INFINITY, loss)
     });
     losses.sum::<f64>() / judged.len() as f64
 }
@@ -142,59 +142,59 @@ fn low_passes(recordings: &[Samples]) -> Vec<f64> {
     LOW_PASSES.iter().map(|share| share * time_s).collect()
 }
 
-/// A row that every voice has estimated without having seen its block.
+/// A row that every member has estimated without having seen its block.
 struct Judged<'a> {
-    row: &'a Row,
-    voices: Vec<Voice>,
+    row: &'a ReadingsRow,
+    members: Vec<Member>,
 }
 
 /// Rows that all channels have estimated, with the regressions' estimates.
-fn judged<'a>(channels: &[FusionChannel], readings: &'a Readings, regressions: &[Vec<Voice>]) -> Vec<Judged<'a>> {
-    let by_row = |channel: &FusionChannel| -> HashMap<(usize, usize), Voice> {
-        let of_row = |one: &LeftOutRow| ((one.recording, one.row), Voice { strain: one.strain, sd: one.strain_sd });
+fn judged<'a>(channels: &[FusionChannel], readings: &'a Readings, regressions: &[Vec<Member>]) -> Vec<Judged<'a>> {
+    let by_row = |channel: &FusionChannel| -> HashMap<(usize, usize), Member> {
+        let of_row = |one: &LeftOutRow| ((one.recording, one.row), Member { strain: one.strain, sd: one.strain_sd });
         channel.left_out.iter().map(of_row).collect()
     };
-    let own: Vec<HashMap<(usize, usize), Voice>> = channels.iter().map(by_row).collect();
-    let of_row = |row: &'a Row| {
-        let of_channel = |own: &HashMap<(usize, usize), Voice>| own.get(&(row.recording, row.row)).copied();
-        let mut voices: Vec<Voice> = own.iter().map(of_channel).collect::<Option<_>>()?;
-        voices.extend(regressions.iter().map(|regression| regression[row.place]));
-        Some(Judged { row, voices })
+    let own: Vec<HashMap<(usize, usize), Member>> = channels.iter().map(by_row).collect();
+    let of_row = |row: &'a ReadingsRow| {
+        let of_channel = |own: &HashMap<(usize, usize), Member>| own.get(&(row.recording, row.row)).copied();
+        let mut members: Vec<Member> = own.iter().map(of_channel).collect::<Option<_>>()?;
+        members.extend(regressions.iter().map(|regression| regression[row.place]));
+        Some(Judged { row, members })
     };
     readings.rows.iter().filter_map(of_row).collect()
 }
 
-/// Covariances about zero of the voices' errors in units of their deviations. Correlations are shrunken toward none, and a voice that errs
+/// Covariances about zero of the members' errors in units of their deviations. Correlations are shrunken toward none, and a member that errs
 /// less than it says is not believed more for it.
 fn covariance(judged: &[Judged]) -> Vec<Vec<f64>> {
-    let voices = judged.first().map_or(0, |one| one.voices.len());
-    let mut sums = vec![vec![0.0; voices]; voices];
+    let members = judged.first().map_or(0, |one| one.members.len());
+    let mut sums = vec![vec![0.0; members]; members];
     for one in judged {
         let deviations: Vec<f64> =
-            one.voices.iter().map(|voice| (voice.strain - one.row.seen.strain) / voice.sd).collect();
-        for (i, of_voice) in sums.iter_mut().enumerate() {
-            of_voice.iter_mut().zip(&deviations).for_each(|(sum, other)| *sum += deviations[i] * other);
+            one.members.iter().map(|member| (member.strain - one.row.seen.strain) / member.sd).collect();
+        for (i, of_member) in sums.iter_mut().enumerate() {
+            of_member.iter_mut().zip(&deviations).for_each(|(sum, other)| *sum += deviations[i] * other);
         }
     }
-    let size = |voice: usize| (sums[voice][voice] / judged.len() as f64).sqrt().max(1.0);
+    let size = |member: usize| (sums[member][member] / judged.len() as f64).sqrt().max(1.0);
     let shrunken = |i: usize, j: usize| {
         let correlation = sums[i][j] / (sums[i][i] * sums[j][j]).sqrt().max(f64::MIN_POSITIVE);
         size(i) * size(j) * if i == j { 1.0 } else { (1.0 - SHRINKAGE) * correlation }
     };
-    (0..voices).map(|i| (0..voices).map(|j| shrunken(i, j)).collect()).collect()
+    (0..members).map(|i| (0..members).map(|j| shrunken(i, j)).collect()).collect()
 }
 
-fn identity(voices: usize) -> Vec<Vec<f64>> {
-    (0..voices).map(|i| (0..voices).map(|j| f64::from(u8::from(i == j))).collect()).collect()
+fn identity(members: usize) -> Vec<Vec<f64>> {
+    (0..members).map(|i| (0..members).map(|j| f64::from(u8::from(i == j))).collect()).collect()
 }
 
 /// Scores of estimates of these rows.
-fn score(judged: &[Judged], voices: &[Option<Voice>]) -> Option<Scores> {
-    let row = |(one, voice): (&Judged, &Option<Voice>)| {
-        let voice = (*voice)?;
+fn score(judged: &[Judged], members: &[Option<Member>]) -> Option<Scores> {
+    let row = |(one, member): (&Judged, &Option<Member>)| {
+        let member = (*member)?;
         let (time_s, truth) = (one.row.time_s, one.row.seen.strain);
-        Some(ScoredRow { time_s, truth, strain: voice.strain, sd: Some(voice.sd) })
+        Some(ScoredRow { time_s, truth, strain: member.strain, sd: Some(member.sd) })
     };
-    let rows: Vec<ScoredRow> = judged.iter().zip(voices).filter_map(row).collect();
+    let rows: Vec<ScoredRow> = judged.iter().zip(members).filter_map(row).collect();
     score_of_full_scale(&rows)
 }

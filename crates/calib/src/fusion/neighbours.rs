@@ -1,6 +1,6 @@
 use ohmstrain_sensor::fusion::{UNLIKE, distance};
 
-use super::readings::{Readings, Row};
+use super::readings::{Readings, ReadingsRow};
 use super::{BLOCKS, KEPT_ROWS};
 use crate::order::{median, sorted};
 
@@ -25,14 +25,14 @@ pub(super) struct Neighbours {
 
 impl Neighbours {
     pub(super) fn new(readings: &Readings) -> Self {
-        let others: Vec<Vec<&Row>> =
+        let others: Vec<Vec<&ReadingsRow>> =
             (0..BLOCKS).map(|block| readings.thinned(|row| row.block != block, KEPT_ROWS).collect()).collect();
         let mut channel_sd: Vec<f64> = (0..readings.channels).map(|channel| spread(readings, channel)).collect();
         for _ in 0..ROUNDS {
             let of_channel = |channel| difference(readings, &others, &channel_sd, channel);
             channel_sd = (0..readings.channels).map(of_channel).collect();
         }
-        let of_row = |row: &Row| {
+        let of_row = |row: &ReadingsRow| {
             let of_others = others[row.block].iter().map(|other| other.seen.ln_r.as_slice());
             distance(&row.seen.ln_r, of_others, &channel_sd)
         };
@@ -56,11 +56,11 @@ fn spread(readings: &Readings, channel: usize) -> f64 {
 }
 
 /// Typical difference of a channel's ln R between a row and the one of other blocks that the other channels are nearest to.
-fn difference(readings: &Readings, others: &[Vec<&Row>], channel_sd: &[f64], channel: usize) -> f64 {
+fn difference(readings: &Readings, others: &[Vec<&ReadingsRow>], channel_sd: &[f64], channel: usize) -> f64 {
     let differences = readings.thinned(|_| true, 4 * KEPT_ROWS).map(|row| {
         let mut without = row.seen.ln_r.clone();
         without[channel] = f64::NAN;
-        let far = |other: &&&Row| distance(&without, std::iter::once(other.seen.ln_r.as_slice()), channel_sd);
+        let far = |other: &&&ReadingsRow| distance(&without, std::iter::once(other.seen.ln_r.as_slice()), channel_sd);
         let nearest = others[row.block].iter().min_by(|a, b| far(a).total_cmp(&far(b)));
         nearest.map_or(0.0, |nearest| (row.seen.ln_r[channel] - nearest.seen.ln_r[channel]).abs())
     });

@@ -5,12 +5,12 @@ use crate::CalibrationError;
 
 /// Rows in which all channels were read and the strain is known.
 pub(super) struct Readings {
-    pub rows: Vec<Row>,
+    pub rows: Vec<ReadingsRow>,
     pub channels: usize,
 }
 
 /// One of these rows.
-pub(super) struct Row {
+pub(super) struct ReadingsRow {
     /// Its place among them.
     pub place: usize,
     pub recording: usize,
@@ -46,7 +46,7 @@ impl Readings {
                 if strain.is_finite() && ln_r.iter().all(|value| value.is_finite()) {
                     let block = row * BLOCKS / samples.len();
                     let seen = FusionRow { strain, ln_r, low_passed: low_passes.states().to_vec() };
-                    rows.push(Row { place: rows.len(), recording, row, time_s: *time_s, block, seen });
+                    rows.push(ReadingsRow { place: rows.len(), recording, row, time_s: *time_s, block, seen });
                 }
             }
         }
@@ -58,8 +58,12 @@ impl Readings {
     }
 
     /// Some of these rows, `most` at most, evenly.
-    pub(super) fn thinned(&self, wanted: impl Fn(&Row) -> bool, most: usize) -> impl Iterator<Item = &Row> {
-        let rows: Vec<&Row> = self.rows.iter().filter(|row| wanted(row)).collect();
+    pub(super) fn thinned(
+        &self,
+        wanted: impl Fn(&ReadingsRow) -> bool,
+        most: usize,
+    ) -> impl Iterator<Item = &ReadingsRow> {
+        let rows: Vec<&ReadingsRow> = self.rows.iter().filter(|row| wanted(row)).collect();
         let stride = rows.len().div_ceil(most).max(1);
         rows.into_iter().step_by(stride)
     }

@@ -1,7 +1,7 @@
-use ohmstrain_sensor::fusion::{FusionRow, Regression, RegressionParams, Voice};
+use ohmstrain_sensor::fusion::{FusionRow, Member, Regression, RegressionParams};
 use rayon::prelude::*;
 
-use super::readings::{Readings, Row};
+use super::readings::{Readings, ReadingsRow};
 use super::{BLOCKS, KEPT_ROWS, REGRESSIONS};
 use crate::CalibrationError;
 
@@ -16,7 +16,7 @@ const JUDGED_ROWS: usize = 200;
 pub(super) fn fit(
     readings: &Readings,
     span: f64,
-) -> Result<(Vec<RegressionParams>, Vec<Vec<Voice>>), CalibrationError> {
+) -> Result<(Vec<RegressionParams>, Vec<Vec<Member>>), CalibrationError> {
     let mut chosen = Vec::new();
     for low_passes in REGRESSIONS {
         let settings = LENGTHS.iter().flat_map(|length| NOISES.iter().map(move |noise| (*length, *noise)));
@@ -28,7 +28,7 @@ pub(super) fn fit(
         let best = settings.into_iter().zip(scores).min_by(|a, b| a.1.total_cmp(&b.1));
         chosen.extend(best.map(|(params, _)| params));
     }
-    let left_out: Option<Vec<Vec<Voice>>> = chosen.par_iter().map(|params| left_out(readings, params, span)).collect();
+    let left_out: Option<Vec<Vec<Member>>> = chosen.par_iter().map(|params| left_out(readings, params, span)).collect();
     Ok((chosen, left_out.ok_or(CalibrationError::NoCommonRows)?))
 }
 
@@ -38,8 +38,8 @@ fn score(readings: &Readings, params: &RegressionParams, span: f64) -> Option<f6
     for block in 0..BLOCKS {
         let regression = without(readings, params, block, span)?;
         for row in readings.thinned(|row| row.block == block, JUDGED_ROWS) {
-            let voice = regression.strain((&row.seen).into());
-            sum += 0.5 * ((voice.strain - row.seen.strain) / voice.sd).powi(2) + voice.sd.ln();
+            let member = regression.strain((&row.seen).into());
+            sum += 0.5 * ((member.strain - row.seen.strain) / member.sd).powi(2) + member.sd.ln();
             count += 1;
         }
     }
@@ -47,11 +47,11 @@ fn score(readings: &Readings, params: &RegressionParams, span: f64) -> Option<f6
 }
 
 /// Estimates of every row by a regression that has not seen its block.
-fn left_out(readings: &Readings, params: &RegressionParams, span: f64) -> Option<Vec<Voice>> {
+fn left_out(readings: &Readings, params: &RegressionParams, span: f64) -> Option<Vec<Member>> {
     let regressions: Option<Vec<Regression>> =
         (0..BLOCKS).map(|block| without(readings, params, block, span)).collect();
     let regressions = regressions?;
-    let of_row = |row: &Row| regressions[row.block].strain((&row.seen).into());
+    let of_row = |row: &ReadingsRow| regressions[row.block].strain((&row.seen).into());
     Some(readings.rows.iter().map(of_row).collect())
 }
 

@@ -45,7 +45,7 @@ pub(crate) fn advice(
     let stroke_s = range.span() / stats.speed.max(f64::MIN_POSITIVE);
     let slow = slow_relaxation(parameters, on_bound);
     let is_fast = on_bound.iter().any(|on| on.bound == Bound::Lower);
-    let told = [
+    let reasons = [
         both_directions(stats, stroke_s),
         enough_strokes(stats, range, stroke_s),
         near_zero(range),
@@ -53,7 +53,7 @@ pub(crate) fn advice(
         is_one_speed(parameters, stats, jacobian).then(|| another_speed(stroke_s)),
         is_fast.then(|| faster(range, stats)),
     ];
-    told.into_iter().flatten().collect()
+    reasons.into_iter().flatten().collect()
 }
 
 /// Advises more releases, or stretches, if there are too few of one kind: only they determine their law.

@@ -1,4 +1,6 @@
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
+
+use crate::dense::{cholesky, gram};
 
 /// Normal equations of a regression, block by block of the recording, so that any subset of columns can be fitted and
 /// cross-validated without touching the rows again.
@@ -21,14 +23,11 @@ impl BlockedNormal {
         blocks: &[std::ops::Range<usize>],
     ) -> Self {
         let size = columns.len() + 1;
-        let gram = |rows: &std::ops::Range<usize>| {
-            let mut design = DMatrix::zeros(rows.len(), size);
-            for (j, column) in columns.iter().chain([response]).enumerate() {
-                design.column_mut(j).copy_from(&column.rows(rows.start, rows.len()));
-            }
-            design.tr_mul(&design)
+        let of_block = |rows: &std::ops::Range<usize>| {
+            let columns = columns.iter().chain([response]).map(|column| &column.as_slice()[rows.clone()]);
+            gram(&columns.collect::<Vec<_>>())
         };
-        let blocks: Vec<_> = blocks.iter().map(gram).collect();
+        let blocks: Vec<_> = blocks.iter().map(of_block).collect();
         let total = blocks.iter().fold(DMatrix::zeros(size, size), |sum, block| sum + block);
         let rows = total[(0, 0)];
         let variance = |j: usize| (total[(j, j)] / rows - (total[(0, j)] / rows).powi(2)).max(0.0);
@@ -96,7 +95,7 @@ impl BlockedNormal {
             }
         }
         let right = DVector::from_iterator(columns.len(), columns.iter().map(|&i| gram[(i, response)] / size(i)));
-        let solution = Cholesky::new(normal)?.solve(&right);
+        let solution = cholesky(normal)?.solve(&right);
         Some(DVector::from_iterator(columns.len(), columns.iter().zip(solution.iter()).map(|(&i, w)| w / size(i))))
     }
 }

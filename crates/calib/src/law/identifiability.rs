@@ -71,10 +71,10 @@ impl Identifiability {
     /// Returns the parameters without the ridge, except time constants that end on a bound: a recording does not determine those, and
     /// their standard errors measure how well the bound is known.
     #[must_use]
-    pub fn told(&self) -> Uncertainty {
+    pub fn off_bounds(&self) -> Uncertainty {
         let Uncertainty { names, values, standard_errors, covariance } = &self.parameters;
-        let told = |i: &usize| self.on_bound.iter().all(|on| on.name != names[*i]);
-        let kept: Vec<usize> = (0..names.len()).filter(told).collect();
+        let is_off_bounds = |i: &usize| self.on_bound.iter().all(|on| on.name != names[*i]);
+        let kept: Vec<usize> = (0..names.len()).filter(is_off_bounds).collect();
         let pick = |values: &[f64]| kept.iter().map(|&i| values[i]).collect::<Vec<f64>>();
         Uncertainty {
             names: kept.iter().map(|&i| names[i].clone()).collect(),

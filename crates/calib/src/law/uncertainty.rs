@@ -1,9 +1,9 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::CalibrationError;
+use crate::dense::product;
 use crate::law::regression::{LawRegression, Solution};
 use crate::law::structure::LawStructure;
-use crate::product::product;
 use ohmstrain_sensor::{LawParameter, LawParams, Uncertainty};
 
 /// Contiguous blocks over which residuals may be correlated as they like.

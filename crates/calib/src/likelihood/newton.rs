@@ -54,7 +54,7 @@ pub(super) fn maximise(
     let (mut radius, mut iterations) = (FIRST_RADIUS, 0);
     loop {
         let free = free(&point, &now.gradient, bounds);
-        let step = Step::new(&now, &free);
+        let step = NewtonStep::new(&now, &free);
         if step.concave && step.decrement <= TOLERANCE * TOLERANCE {
             return Ok(Optimum { point, derivatives: now, free, iterations, converged: true });
         }
@@ -89,7 +89,7 @@ fn free(point: &[f64], gradient: &DVector<f64>, bounds: &[(f64, f64)]) -> Vec<us
 }
 
 /// A Newton step with every curvature made a maximum's.
-struct Step {
+struct NewtonStep {
     direction: DVector<f64>,
     /// gᵀ |H|⁻¹ g: twice the gain expected, and the squared length of the step in standard errors.
     decrement: f64,
@@ -97,7 +97,7 @@ struct Step {
     concave: bool,
 }
 
-impl Step {
+impl NewtonStep {
     fn new(at: &Derivatives, free: &[usize]) -> Self {
         let mut step = Self { direction: DVector::zeros(at.gradient.len()), decrement: 0.0, concave: true };
         if free.is_empty() {

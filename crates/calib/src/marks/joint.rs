@@ -7,7 +7,7 @@ use crate::law::design::StrainScale;
 use crate::law::fit::{LawOptions, structure_on_grid};
 use crate::law::regression::LawRegression;
 use crate::law::structure::LawStructure;
-use crate::marks::motion::Motion;
+use crate::marks::motion::MarkedMotion;
 use crate::order::median;
 use crate::samples::Samples;
 use ohmstrain_sensor::RangeParams;
@@ -34,7 +34,7 @@ const DIFFERENCE: f64 = 1e-3;
 
 /// A motion that was fitted, with the covariance of its parameters.
 pub(crate) struct Fitted {
-    pub motion: Motion,
+    pub motion: MarkedMotion,
     parameters: DVector<f64>,
     covariance: DMatrix<f64>,
 }
@@ -54,7 +54,7 @@ struct Problem<'a> {
 }
 
 /// Fits `motion`, and makes moves irregular that the law does not explain as regular ones.
-pub(crate) fn fit(samples: &Samples, mut motion: Motion, range: RangeParams) -> Result<Fitted, CalibrationError> {
+pub(crate) fn fit(samples: &Samples, mut motion: MarkedMotion, range: RangeParams) -> Result<Fitted, CalibrationError> {
     let stride = samples.len().div_ceil(MOST_ROWS).max(1);
     let thinned = |values: &[f64]| values.iter().copied().step_by(stride).collect::<Vec<f64>>();
     let (time_s, reading) = (thinned(samples.time_s), thinned(samples.reading));
@@ -111,7 +111,7 @@ impl<'a> Problem<'a> {
     fn new(
         time_s: &'a [f64],
         reading: &'a [f64],
-        motion: &Motion,
+        motion: &MarkedMotion,
         range: RangeParams,
     ) -> Result<Self, CalibrationError> {
         let place = |k: usize| motion.move_at(time_s[k]).filter(|_| reading[k].is_finite()).map(|of_move| (k, of_move));
@@ -128,17 +128,17 @@ impl<'a> Problem<'a> {
     }
 
     /// The samples with the motion's strains for a reference.
-    fn with_samples<T>(&self, motion: &Motion, z: &DVector<f64>, of: impl FnOnce(&Samples) -> T) -> T {
+    fn with_samples<T>(&self, motion: &MarkedMotion, z: &DVector<f64>, of: impl FnOnce(&Samples) -> T) -> T {
         let strain = motion.strains(z, self.time_s);
         of(&Samples { time_s: self.time_s, reading: self.reading, strain: &strain, strain_sd: &[] })
     }
 
     /// The law's structure: one that no single move has a regressor in to itself.
-    fn structure(&self, motion: &Motion, z: &DVector<f64>) -> Result<LawStructure, CalibrationError> {
+    fn structure(&self, motion: &MarkedMotion, z: &DVector<f64>) -> Result<LawStructure, CalibrationError> {
         structure_on_grid(&self.regression(motion, z)?, LawOptions::default(), RIDGE)
     }
 
-    fn regression(&self, motion: &Motion, z: &DVector<f64>) -> Result<LawRegression, CalibrationError> {
+    fn regression(&self, motion: &MarkedMotion, z: &DVector<f64>) -> Result<LawRegression, CalibrationError> {
         let RangeParams { lower, upper } = self.range;
         let scale = StrainScale { centre: 0.5 * (lower + upper), span: upper - lower };
         self.with_samples(motion, z, |samples| LawRegression::on_scale(&[*samples], scale, self.range))
@@ -148,7 +148,7 @@ impl<'a> Problem<'a> {
     fn design(
         &self,
         structure: &LawStructure,
-        motion: &Motion,
+        motion: &MarkedMotion,
         z: &DVector<f64>,
     ) -> Result<DMatrix<f64>, CalibrationError> {
         let RangeParams { lower, upper } = self.range;
@@ -182,7 +182,7 @@ impl<'a> Problem<'a> {
     /// law's error.
     fn descend(
         &self,
-        motion: &Motion,
+        motion: &MarkedMotion,
         mut structure: LawStructure,
         variance: f64,
     ) -> Result<(DVector<f64>, DMatrix<f64>), CalibrationError> {
@@ -221,7 +221,7 @@ impl<'a> Problem<'a> {
     /// Half the weighted squares, with the law that is best there.
     fn cost(
         &self,
-        (motion, structure): (&Motion, &LawStructure),
+        (motion, structure): (&MarkedMotion, &LawStructure),
         z: &DVector<f64>,
         weights: &DVector<f64>,
     ) -> Result<f64, CalibrationError> {
@@ -280,7 +280,7 @@ struct Linear<'a> {
 impl<'a> Linear<'a> {
     fn new(
         problem: &Problem,
-        (motion, structure): (&Motion, &LawStructure),
+        (motion, structure): (&MarkedMotion, &LawStructure),
         z: &DVector<f64>,
         weights: &'a DVector<f64>,
     ) -> Result<Self, CalibrationError> {

@@ -21,7 +21,7 @@ use ohmstrain_sensor::{EstimatorKind, RangeParams};
 
 use joint::fit;
 pub use mark::{Mark, MarksError};
-use motion::Motion;
+use motion::MarkedMotion;
 
 /// Shapes of moves that are tried: constant speed, and two between it and minimum jerk.
 const SHAPES: [f64; 3] = [0.0, 0.4, 0.8];
@@ -68,8 +68,8 @@ pub fn marked_references(
     let lower = ranges.iter().map(|range| range.0).fold(f64::INFINITY, f64::min);
     let upper = ranges.iter().map(|range| range.1).fold(f64::NEG_INFINITY, f64::max);
     let range = RangeParams { lower, upper };
-    let motions = |shape: f64| -> Vec<Motion> {
-        let of_one = |(samples, marks): (&Samples, &Vec<Mark>)| Motion::new(samples, marks, range.span(), shape);
+    let motions = |shape: f64| -> Vec<MarkedMotion> {
+        let of_one = |(samples, marks): (&Samples, &Vec<Mark>)| MarkedMotion::new(samples, marks, range.span(), shape);
         recordings.iter().zip(marks).map(of_one).collect()
     };
     let tried = SHAPES.map(|shape| (shape, score(recordings, &motions(shape))));
@@ -82,9 +82,10 @@ pub fn marked_references(
 }
 
 /// Score of an extended Kalman filter that is calibrated on regular motions; less is better.
-fn score(recordings: &[Samples], motions: &[Motion]) -> Result<f64, CalibrationError> {
-    let of_one =
-        |(samples, motion): (&Samples, &Motion)| motion.strains(&DVector::zeros(motion.parameters()), samples.time_s);
+fn score(recordings: &[Samples], motions: &[MarkedMotion]) -> Result<f64, CalibrationError> {
+    let of_one = |(samples, motion): (&Samples, &MarkedMotion)| {
+        motion.strains(&DVector::zeros(motion.parameters()), samples.time_s)
+    };
     let strains: Vec<Vec<f64>> = recordings.iter().zip(motions).map(of_one).collect();
     let samples: Vec<Samples> =
         recordings.iter().zip(&strains).map(|(samples, strain)| Samples { strain, ..*samples }).collect();
@@ -92,7 +93,7 @@ fn score(recordings: &[Samples], motions: &[Motion]) -> Result<f64, CalibrationE
     calibration.estimators.get(&EstimatorKind::Ekf).map(|params| params.score).ok_or(CalibrationError::Singular)
 }
 
-fn reference(samples: &Samples, motion: Motion, range: RangeParams) -> Result<MarkedReference, CalibrationError> {
+fn reference(samples: &Samples, motion: MarkedMotion, range: RangeParams) -> Result<MarkedReference, CalibrationError> {
     let fitted = fit(samples, motion, range)?;
     let (strain, strain_sd) = fitted.strains(samples.time_s);
     let motion = &fitted.motion;

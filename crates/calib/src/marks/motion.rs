@@ -40,7 +40,7 @@ struct Stop {
 /// A motion through marks. Its parameters z are in units of their prior standard deviations and have mean zero: two per mark (time and
 /// strain), one more per hold (its end), [`INNER_KNOTS`] per irregular move.
 #[derive(Clone, Debug)]
-pub(crate) struct Motion {
+pub(crate) struct MarkedMotion {
     stops: Vec<Stop>,
     shape: f64,
     /// Pace of each move; `None` for a regular one.
@@ -48,7 +48,7 @@ pub(crate) struct Motion {
     span: f64,
 }
 
-impl Motion {
+impl MarkedMotion {
     /// Marks that were checked, whose strains span `span`; every move is regular.
     pub(crate) fn new(samples: &Samples, marks: &[Mark], span: f64, shape: f64) -> Self {
         let stillness = Stillness::new(samples);
@@ -146,7 +146,7 @@ impl Motion {
 
 /// A motion under some parameters.
 struct Moved<'a> {
-    motion: &'a Motion,
+    motion: &'a MarkedMotion,
     stops: Vec<Stop>,
     inner: Vec<Option<[f64; INNER_KNOTS]>>,
 }

@@ -62,8 +62,8 @@ fn law(sensors: &[SensorParams], validity: &Validity) -> Result<LawPrior, Calibr
     let tau_s = time_constants(&laws);
     let probe = Probe::new(range, validity.fastest_rate_per_s, &tau_s)?;
     let weights: Vec<DVector<f64>> = laws.iter().map(|law| probe.weights(law)).collect();
-    let told = sensors.iter().filter_map(|sensor| Some(probe.errors(&sensor.law, sensor.uncertainty.as_ref()?)));
-    let mut population = Population::new(&weights, usual(told.collect(), &weights).as_ref());
+    let errors = sensors.iter().filter_map(|sensor| Some(probe.errors(&sensor.law, sensor.uncertainty.as_ref()?)));
+    let mut population = Population::new(&weights, usual(errors.collect(), &weights).as_ref());
     for (i, mean) in population.mean.iter().enumerate() {
         population.covariance[(i, i)] += (LEAST_SPREAD * mean).powi(2).max(LEAST_VARIANCE);
     }
@@ -131,6 +131,9 @@ fn of_median(sensors: &[SensorParams]) -> Validity {
         duration_s: of(|sensor| sensor.validity.duration_s),
         drifts: sensors.iter().any(|sensor| sensor.validity.drifts),
         longest_repeat_s: of(|sensor| sensor.validity.longest_repeat_s),
+        longest_unturned_s: crate::order::median(
+            sensors.iter().filter_map(|sensor| sensor.validity.longest_unturned_s),
+        ),
         resolution: None,
     }
 }

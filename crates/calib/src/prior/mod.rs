@@ -70,6 +70,9 @@ impl Prior {
             duration_s: own.duration_s.max(of_make.duration_s),
             drifts: own.drifts || of_make.drifts,
             longest_repeat_s: own.longest_repeat_s.max(of_make.longest_repeat_s),
+            longest_unturned_s: own
+                .longest_unturned_s
+                .map(|own_s| own_s.max(of_make.longest_unturned_s.unwrap_or(own_s))),
             resolution: own.resolution,
         }
     }

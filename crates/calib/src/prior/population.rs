@@ -1,4 +1,4 @@
-use crate::product::product;
+use crate::dense::product;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// Share of the spread seen that sensors differ by at least, in every direction: what their own errors may take away is

@@ -1,11 +1,11 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::CalibrationError;
+use crate::dense::product;
 use crate::law::regression::LawRegression;
 use crate::law::robust_loss::robust;
 use crate::law::structure::GaugeFamily;
 use crate::law::structure::LawStructure;
-use crate::product::product;
 use crate::samples::Samples;
 use ohmstrain_sensor::{LawParameter, LawParams, RangeParams, Uncertainty};
 
@@ -53,14 +53,14 @@ impl Probe {
     /// Returns the weights of the common structure whose readings are nearest to those of this law.
     pub(super) fn weights(&self, law: &LawParams) -> DVector<f64> {
         let structure = LawStructure::of_law(law, self.regression.scale.span, 0.0);
-        let said = structure.design(&self.regression).fitted(&structure.weights(law, self.regression.scale));
-        self.normal.solve(&self.columns.tr_mul(&said))
+        let fitted = structure.design(&self.regression).fitted(&structure.weights(law, self.regression.scale));
+        self.normal.solve(&self.columns.tr_mul(&fitted))
     }
 
     /// Returns the covariance of those weights from that of the law's parameters; undetermined parameters are taken for known.
-    pub(super) fn errors(&self, law: &LawParams, told: &Uncertainty) -> DMatrix<f64> {
-        let mut slopes = DMatrix::zeros(self.columns.ncols(), told.names.len());
-        for (j, name) in told.names.iter().enumerate() {
+    pub(super) fn errors(&self, law: &LawParams, uncertainty: &Uncertainty) -> DMatrix<f64> {
+        let mut slopes = DMatrix::zeros(self.columns.ncols(), uncertainty.names.len());
+        for (j, name) in uncertainty.names.iter().enumerate() {
             let moved = |sign: f64| {
                 let mut law = law.clone();
                 let LawParameter { value, .. } = law.parameters_mut().into_iter().find(|own| own.name == *name)?;
@@ -72,8 +72,8 @@ impl Probe {
                 slopes.set_column(j, &((up - down) / (2.0 * step)));
             }
         }
-        let size = told.names.len();
-        let covariance = DMatrix::from_fn(size, size, |i, j| told.covariance[i][j]);
+        let size = uncertainty.names.len();
+        let covariance = DMatrix::from_fn(size, size, |i, j| uncertainty.covariance[i][j]);
         product(&product(&slopes, &covariance), &slopes.transpose())
     }
 }

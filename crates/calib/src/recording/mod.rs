@@ -8,3 +8,4 @@ pub(crate) mod resolution;
 pub(crate) mod rest;
 pub(crate) mod screen;
 pub(crate) mod sessions;
+pub(crate) mod turns;

@@ -46,11 +46,11 @@ mod tests {
             sessions(&recordings, &[2000.0, 3000.0], 0.3)
         };
         // Both begin at half of R₀; R₀ are a factor of 1.5 apart: squares of ln 1.5 / 2 on either side of the mean.
-        let told = of(&at_rest, &at_rest).unwrap();
+        let sessions = of(&at_rest, &at_rest).unwrap();
         let squares = 1.5_f64.ln().powi(2) / 2.0;
-        assert!((told.rest_sd.powi(2) - (0.0225 + squares) / 2.0).abs() < 1e-12, "{told:?}");
-        assert!((told.start_sd.powi(2) - 0.0225 / 2.0).abs() < 1e-12, "{told:?}");
-        assert!((told.weight() - (0.0225 + squares) / (0.045 + squares)).abs() < 1e-12);
+        assert!((sessions.rest_sd.powi(2) - (0.0225 + squares) / 2.0).abs() < 1e-12, "{sessions:?}");
+        assert!((sessions.start_sd.powi(2) - 0.0225 / 2.0).abs() < 1e-12, "{sessions:?}");
+        assert!((sessions.weight() - (0.0225 + squares) / (0.045 + squares)).abs() < 1e-12);
         assert_eq!(of(&at_rest, &stretched), None);
     }
 }

@@ -13,10 +13,10 @@ pub struct CalibrateArgs {
     /// File to write the sensor's parameters to; for several channels hand.toml, with the sensors beside it
     #[arg(short, long, value_name = "sensor.toml")]
     pub output: PathBuf,
-    /// Use rows with time_s >= T only
+    /// Calibrate on rows with time_s >= T only; the others test the sensor, and widen intervals that do not hold them
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = finite)]
     pub from: Option<f64>,
-    /// Use rows with time_s < T only
+    /// Calibrate on rows with time_s < T only; the others test the sensor, and widen intervals that do not hold them
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = finite)]
     pub until: Option<f64>,
     /// Relaxing branches: auto (1 to 3, what the filter does best with) or 0 to 4

@@ -23,6 +23,17 @@ pub struct DemoArgs {
     pub replace: ReplaceArgs,
 }
 
+/// Flags of `example`.
+#[derive(Debug, ClapArgs)]
+pub struct ExampleArgs {
+    /// File to write instead of stdout
+    #[arg(short, long)]
+    pub output: Option<PathBuf>,
+    /// Permission to replace files
+    #[command(flatten)]
+    pub replace: ReplaceArgs,
+}
+
 /// Sensors of `demo`, neither of the family of laws that is fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum DemoMaterial {

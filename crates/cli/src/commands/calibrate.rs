@@ -3,8 +3,8 @@ use std::path::Path;
 use std::time::Instant;
 
 use ohmstrain::{
-    Calibrated, Calibration, Closing, Error, EstimatorKind, Findings, Quantity, ReadingUnit, Sensor, SensorParams,
-    Tested, calibration_doubts, motion_doubts,
+    Calibrated, Calibration, Closing, Error, EstimatorKind, Findings, Kept, Quantity, ReadingUnit, Sensor, Tested,
+    calibration_doubts, motion_doubts,
 };
 use ohmstrain_calib::{Samples, screen};
 
@@ -14,7 +14,6 @@ use super::fleet;
 use super::hand;
 use super::reporting::{Reporting, Wanted};
 use super::scoring::Part;
-use super::tested::{Kept, tested};
 use crate::alignment;
 use crate::args::CalibrateArgs;
 use crate::channels::Table;
@@ -85,7 +84,7 @@ pub fn calibrate(args: &CalibrateArgs, messages: &Messages) -> Result<Outcome, C
         let rows = rows_in(args, &recording)?;
         recordings.push(recording.rows(rows.clone()));
         if rows.len() < recording.trace.len() {
-            kept.push((recordings.len() - 1, Kept { whole: recording, seen: rows }));
+            kept.push((recordings.len() - 1, recording, rows));
         }
     }
     let lags_s = if args.marks.is_empty() {
@@ -106,14 +105,13 @@ pub fn calibrate(args: &CalibrateArgs, messages: &Messages) -> Result<Outcome, C
     let Calibrated { sensor, findings, .. } = calibrate_recordings(&recordings, wished, &progress)?;
     drop(progress);
     let calibration_s = start.elapsed().as_secs_f64();
-    for (recording, kept) in &mut kept {
-        alignment::shift(&mut kept.whole, lags_s[*recording])?;
+    for (recording, whole, _) in &mut kept {
+        alignment::shift(whole, lags_s[*recording])?;
     }
-    let tested = tested(&kept.into_iter().map(|(_, kept)| kept).collect::<Vec<_>>(), &sensor);
-    let sensor = match &tested {
-        Some(tested) => Sensor::from_params(SensorParams { tested: Some(tested.into()), ..sensor.into_params() })?,
-        None => sensor,
-    };
+    let rows: Vec<_> = kept.iter().map(|(_, whole, _)| |row| whole.known_row(row)).collect();
+    let kept =
+        kept.iter().zip(&rows).map(|((_, whole, seen), row)| Kept { len: whole.trace.len(), row, seen: seen.clone() });
+    let (sensor, tested) = sensor.tested_on(&kept.collect::<Vec<_>>())?;
     outputs.put(sensor_output, sensor_file::text(&sensor)?);
     let mut outcome = Outcome { sensor, findings, tested, calibration_s, explained: String::new() };
     let file = args.output.display().to_string();

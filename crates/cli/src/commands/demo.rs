@@ -1,7 +1,7 @@
 use std::time::Instant;
 
 use ohmstrain::{Calibrated, Calibration, Closing, Estimate, Sensor};
-use ohmstrain_bench_data::simulate::{Material, Protocol, SimulationSettings};
+use ohmstrain_bench_data::simulate::{Material, SimulationSettings};
 
 use super::calibrate::calibrate_recordings;
 use super::reporting::{Reporting, Wanted};
@@ -104,7 +104,7 @@ fn settings(material: DemoMaterial, seed: u64) -> SimulationSettings {
         DemoMaterial::Representative => Material::Representative,
         DemoMaterial::WorstCase => Material::Ecoflex0030,
     };
-    SimulationSettings { speed_mm_s: 5.0, mismatched: true, seed, ..SimulationSettings::new(material, Protocol::MIXED) }
+    SimulationSettings { material, seed, ..SimulationSettings::example() }
 }
 
 fn estimates(sensor: &Sensor, estimates: &[Estimate]) -> Result<Vec<u8>, CliError> {

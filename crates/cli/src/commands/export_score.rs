@@ -58,9 +58,9 @@ impl OnRecording {
     fn exported(&self, params: &SensorParams, plan: &Plan, args: &ExportArgs) -> Result<Scores, CliError> {
         let replayed = export::replay(params, plan, self.dt_s, &self.rows)
             .map_err(|error| CliError::export(&error, &args.sensor.display().to_string()))?;
-        let of = |(row, said): (&ScoredRow, &export::Said)| ScoredRow {
-            strain: said.strain.into(),
-            sd: Some(said.sd.into()),
+        let of = |(row, estimate): (&ScoredRow, &export::ChipEstimate)| ScoredRow {
+            strain: estimate.strain.into(),
+            sd: Some(estimate.sd.into()),
             ..*row
         };
         self.scores(&self.program.iter().zip(&replayed).map(of).collect::<Vec<_>>())

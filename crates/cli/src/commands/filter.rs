@@ -18,7 +18,7 @@ use crate::output::{Kind, RowsOut};
 use crate::readings::{late, no_row};
 use crate::run::{builder, builder_anew, rest_resistance};
 use crate::sensor_file;
-use crate::stream::{self, Rows};
+use crate::stream::{self, RowSource};
 use crate::suits::{self, FIRST_LIVE_READINGS, FIRST_READINGS};
 use crate::whole_file::is_stdin;
 
@@ -148,7 +148,7 @@ struct Stream<'a, W: io::Write + Send> {
 
 impl<'a, W: io::Write + Send> Stream<'a, W> {
     /// Filters row by row; how many rows were written, and the state if it is to be saved.
-    fn run(mut self, mut rows: Rows) -> Result<(u64, Option<String>), CliError> {
+    fn run(mut self, mut rows: RowSource) -> Result<(u64, Option<String>), CliError> {
         let wanted = self.args.estimate.rest_resistance;
         // The rows that R₀ is taken from, at least one, are estimated too, once it is known.
         let count = if let Some(RestResistance::First(count)) = wanted { count } else { 0 };
@@ -188,7 +188,7 @@ impl<'a, W: io::Write + Send> Stream<'a, W> {
     }
 
     /// Returns the state from which the next row can go on.
-    fn state(&self, rows: &Rows) -> Result<String, CliError> {
+    fn state(&self, rows: &RowSource) -> Result<String, CliError> {
         let mut stored = self.filter.store()?;
         stored.rest_resistance = self.sink.rest;
         stored.clock = rows.last_time().map(filter_state::of_last_time);
@@ -198,7 +198,7 @@ impl<'a, W: io::Write + Send> Stream<'a, W> {
     }
 
     /// Takes a row or an error; `rows` is its source.
-    fn take(&mut self, row: Result<DeviceRow, TraceError>, rows: &Rows) -> Result<(), CliError> {
+    fn take(&mut self, row: Result<DeviceRow, TraceError>, rows: &RowSource) -> Result<(), CliError> {
         let DeviceRow { row, restarted } = match row {
             Err(TraceError::Content(fault)) if self.args.skip_bad => {
                 self.skipped.count(fault);
@@ -217,7 +217,7 @@ impl<'a, W: io::Write + Send> Stream<'a, W> {
     }
 
     /// The clock has started again: so does the filter. Times stay those of the file.
-    fn restart(&mut self, row: &Row, rows: &Rows) -> Result<(), CliError> {
+    fn restart(&mut self, row: &Row, rows: &RowSource) -> Result<(), CliError> {
         let at = format!("{}:{}", self.sink.file, row.line);
         check_unit(&at, rows.reading_kind(), self.sink.sensor.params().reading)?;
         self.finish()?;
@@ -337,7 +337,7 @@ const MOST_WAITING_ROWS: usize = 1 << 20;
 /// The first rows: until `wanted` readings are known, or `enough` of them and many rows. An error ends them; it is returned
 /// if fewer readings than that are known.
 fn first_rows(
-    rows: &mut Rows,
+    rows: &mut RowSource,
     skips_bad: bool,
     enough: usize,
     wanted: usize,

@@ -25,7 +25,6 @@ mod serial_check;
 mod shell;
 mod simulate;
 mod smooth;
-mod tested;
 
 use crate::args::Command;
 use crate::error::CliError;
@@ -35,6 +34,7 @@ use crate::messages::Messages;
 pub fn dispatch(command: &Command, messages: &Messages) -> Result<(), CliError> {
     match command {
         Command::Demo(args) => demo::run(args, messages),
+        Command::Example(args) => simulate::example(args),
         Command::Inspect(args) => inspect::run(args),
         Command::Import(args) => import::run(args, messages),
         Command::Simulate(args) => simulate::run(args),

@@ -11,7 +11,7 @@ use crate::error::CliError;
 use crate::output::print;
 use crate::sensor_file;
 use crate::whole_file::is_stdin;
-use ohmstrain_export::{self as export, Plan, ReplayedRow, Said};
+use ohmstrain_export::{self as export, ChipEstimate, Plan, ReplayedRow};
 
 /// Steps of a port, which never ends.
 const STEPS_OF_A_PORT: usize = 600;
@@ -35,11 +35,12 @@ pub fn run(args: &SerialCheckArgs) -> Result<(), CliError> {
         None => Plan { kind: asked, ..Plan::default() },
         Some(budget) => export::first_fitting(params, budget, dt_s).map_err(|error| CliError::export(&error, &name))?,
     };
-    let heard = listen(args)?;
-    let said = replayed(params, &plan, dt_s, &heard.steps).map_err(|error| CliError::export(&error, &name))?;
-    let farthest = compared(&heard.steps, &said)?;
+    let received = listen(args)?;
+    let expected_rows =
+        replayed(params, &plan, dt_s, &received.steps).map_err(|error| CliError::export(&error, &name))?;
+    let farthest = compared(&received.steps, &expected_rows)?;
     print(|out| {
-        writeln!(out, "{} steps, {} other lines", heard.steps.len(), heard.others)?;
+        writeln!(out, "{} steps, {} other lines", received.steps.len(), received.others)?;
         writeln!(
             out,
             "largest difference: strain {:.1e}, its deviation {:.1e}; the deviation is {:.1e} at least; \
@@ -55,7 +56,7 @@ const LINE: &str = "step:0,us:50000,ohm:1600.0000,strain:0.10000,lo:0.08000,hi:0
 
 /// A step as the board printed it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Step {
+struct BoardStep {
     number: u64,
     /// Time since the step before, µs.
     since_us: u32,
@@ -65,7 +66,7 @@ struct Step {
     flags: u32,
 }
 
-impl Step {
+impl BoardStep {
     /// Parses a line like [`LINE`]; `None` for any other.
     fn of(line: &[u8]) -> Option<Self> {
         let line = std::str::from_utf8(line).ok()?.trim();
@@ -85,18 +86,18 @@ impl Step {
 }
 
 /// Lines that came from a board.
-struct Heard {
-    steps: Vec<Step>,
+struct Received {
+    steps: Vec<BoardStep>,
     /// Lines that are no steps.
     others: usize,
 }
 
 /// Reads until there are steps enough, from a board's first one on.
-fn listen(args: &SerialCheckArgs) -> Result<Heard, CliError> {
+fn listen(args: &SerialCheckArgs) -> Result<Received, CliError> {
     let name = args.port.display().to_string();
     let ends = is_stdin(&args.port) || args.port.is_file();
     let wanted = args.steps.unwrap_or(if ends { usize::MAX } else { STEPS_OF_A_PORT });
-    let mut heard = Heard { steps: Vec::new(), others: 0 };
+    let mut received = Received { steps: Vec::new(), others: 0 };
     let mut late = None;
     for event in Source::open(Path::new(&args.port), args.baud)?.events {
         let line = match event {
@@ -105,42 +106,47 @@ fn listen(args: &SerialCheckArgs) -> Result<Heard, CliError> {
             Event::Ended => break,
             Event::Away(why) => return Err(CliError::Other(format!("cannot read {name}: {why}"))),
         };
-        match Step::of(&line) {
-            None => heard.others += 1,
-            Some(step) if step.number == 0 => heard.steps = vec![step],
-            Some(step) if heard.steps.is_empty() => late = late.or(Some(step.number)),
+        match BoardStep::of(&line) {
+            None => received.others += 1,
+            Some(step) if step.number == 0 => received.steps = vec![step],
+            Some(step) if received.steps.is_empty() => late = late.or(Some(step.number)),
             Some(step) => {
-                let expected = heard.steps.len() as u64;
+                let expected = received.steps.len() as u64;
                 if step.number != expected {
                     return Err(CliError::Input(format!(
                         "{name}: expected step {expected}, found step {}: lines were lost; send fewer, or faster",
                         step.number
                     )));
                 }
-                heard.steps.push(step);
+                received.steps.push(step);
             }
         }
-        if heard.steps.len() >= wanted {
+        if received.steps.len() >= wanted {
             break;
         }
     }
-    match (heard.steps.is_empty(), late) {
-        (false, _) => Ok(heard),
+    match (received.steps.is_empty(), late) {
+        (false, _) => Ok(received),
         (true, Some(number)) => Err(CliError::Input(format!(
             "{name}: expected step 0 first, found step {number}: reset the board while it is listened to"
         ))),
         (true, None) => Err(CliError::Input(format!(
             "{name}: expected lines like {LINE}, found none in {}; is OHMSTRAIN_CHECK 1 in the sketch?",
-            heard.others
+            received.others
         ))),
     }
 }
 
 /// The twin's estimates from the board's readings.
-fn replayed(params: &SensorParams, plan: &Plan, dt_s: f64, steps: &[Step]) -> Result<Vec<Said>, export::ExportError> {
+fn replayed(
+    params: &SensorParams,
+    plan: &Plan,
+    dt_s: f64,
+    steps: &[BoardStep],
+) -> Result<Vec<ChipEstimate>, export::ExportError> {
     // As the sketch rounds it.
     let row =
-        |step: &Step| ReplayedRow { since_s: 1e-6_f32 * step.since_us as f32, reading: step.ohm, reading_sd: 0.0 };
+        |step: &BoardStep| ReplayedRow { since_s: 1e-6_f32 * step.since_us as f32, reading: step.ohm, reading_sd: 0.0 };
     let rows: Vec<ReplayedRow> = steps.iter().map(row).collect();
     export::replay(params, plan, dt_s, &rows)
 }
@@ -154,10 +160,10 @@ struct Farthest {
     other_flags: usize,
 }
 
-fn compared(steps: &[Step], said: &[Said]) -> Result<Farthest, CliError> {
+fn compared(steps: &[BoardStep], expected_rows: &[ChipEstimate]) -> Result<Farthest, CliError> {
     let mut farthest = Farthest { strain: 0.0, sd: 0.0, least_sd: f64::INFINITY, other_flags: 0 };
-    for (step, said) in steps.iter().zip(said) {
-        let (strain, sd) = (f64::from(said.strain), f64::from(said.sd));
+    for (step, expected) in steps.iter().zip(expected_rows) {
+        let (strain, sd) = (f64::from(expected.strain), f64::from(expected.sd));
         let (of_strain, of_sd) = ((step.strain - strain).abs(), (step.sd - sd).abs());
         let least = PRINTED_TO + SHARE_OF_DEVIATION * sd;
         // Not a number is no agreement.
@@ -171,7 +177,7 @@ fn compared(steps: &[Step], said: &[Said]) -> Result<Farthest, CliError> {
         farthest.strain = farthest.strain.max(of_strain);
         farthest.sd = farthest.sd.max(of_sd);
         farthest.least_sd = farthest.least_sd.min(sd);
-        farthest.other_flags += usize::from(step.flags != said.flags);
+        farthest.other_flags += usize::from(step.flags != expected.flags);
     }
     if farthest.other_flags as f64 > OTHER_FLAGS * steps.len() as f64 {
         let count = farthest.other_flags;
@@ -182,19 +188,20 @@ fn compared(steps: &[Step], said: &[Said]) -> Result<Farthest, CliError> {
 
 #[cfg(test)]
 mod tests {
-    use super::{LINE, Step};
+    use super::{BoardStep, LINE};
 
     #[test]
     fn a_line_is_a_step_or_something_else() {
-        let step = Step::of(b"step:3,us:50012,ohm:1600.5000,strain:0.10000,lo:0.08040,hi:0.11960,flags:16\r").unwrap();
+        let step =
+            BoardStep::of(b"step:3,us:50012,ohm:1600.5000,strain:0.10000,lo:0.08040,hi:0.11960,flags:16\r").unwrap();
         assert_eq!((step.number, step.since_us, step.ohm, step.strain, step.flags), (3, 50012, 1600.5, 0.1, 16));
-        assert!((step.sd - 0.01).abs() < 1e-12 && Step::of(LINE.as_bytes()).is_some());
-        let open = Step::of(b"step:4,us:50000,ohm:ovf,strain:0.1,lo:0.0,hi:0.2,flags:2").unwrap();
+        assert!((step.sd - 0.01).abs() < 1e-12 && BoardStep::of(LINE.as_bytes()).is_some());
+        let open = BoardStep::of(b"step:4,us:50000,ohm:ovf,strain:0.1,lo:0.0,hi:0.2,flags:2").unwrap();
         assert_eq!(open.ohm, f64::INFINITY);
         for other in
             ["", "ets Jul 29 2019", "strain:0.1,lo:0.0,hi:0.2,flags:0", "step:4,us:5,ohm:16", "time_s,resistance_ohm"]
         {
-            assert_eq!(Step::of(other.as_bytes()), None, "{other}");
+            assert_eq!(BoardStep::of(other.as_bytes()), None, "{other}");
         }
     }
 }

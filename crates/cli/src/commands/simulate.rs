@@ -1,15 +1,15 @@
+use std::path::Path;
+
 use ohmstrain_bench_data::Trace;
 use ohmstrain_bench_data::simulate::{SimulationSettings, simulate};
 
-use crate::args::SimulateArgs;
+use crate::args::{ExampleArgs, ReplaceArgs, SimulateArgs};
 use crate::error::CliError;
 use crate::output::{Kind, Outputs, SIMULATE};
 use ohmstrain::MADE_BY;
 
 /// Simulates a recording and writes it.
 pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
-    let mut outputs = Outputs::new(args.replace.force, []);
-    let output = outputs.claim_or_stdout(args.output.as_deref(), Kind::Simulation)?;
     let settings = SimulationSettings {
         elongation_mm: args.elongation_mm,
         speed_mm_s: args.speed_mm_s,
@@ -20,7 +20,19 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
         individual: args.individual,
         ..SimulationSettings::new(args.material, args.protocol)
     };
-    let bytes = bytes(&settings).map_err(CliError::Arguments)?;
+    write(&settings, args.output.as_deref(), &args.replace)
+}
+
+/// Writes the recording of the demo.
+pub fn example(args: &ExampleArgs) -> Result<(), CliError> {
+    write(&SimulationSettings::example(), args.output.as_deref(), &args.replace)
+}
+
+/// Simulates and writes, to stdout if no file is given. The file is claimed first: a foreign one is refused before any work.
+fn write(settings: &SimulationSettings, file: Option<&Path>, replace: &ReplaceArgs) -> Result<(), CliError> {
+    let mut outputs = Outputs::new(replace.force, []);
+    let output = outputs.claim_or_stdout(file, Kind::Simulation)?;
+    let bytes = bytes(settings).map_err(CliError::Arguments)?;
     outputs.publish_or_print(output, bytes)
 }
 

@@ -35,7 +35,7 @@ impl Identity {
 }
 
 /// Destination of an output.
-pub enum Place {
+pub enum Destination {
     /// Into what stands there and takes bytes: a device, a pipe, an open file of this process.
     Through(File),
     /// A file, whole: written to a temporary neighbour that then takes its place.
@@ -54,7 +54,7 @@ const MOST_LINKS: usize = 40;
 /// Bytes that tell what a file is.
 const HEAD: u64 = 4096;
 
-impl Place {
+impl Destination {
     /// Checks that `path` can be written, and leaves it as it is.
     pub fn of(path: &Path) -> io::Result<Self> {
         let found = fs::metadata(path).ok();

@@ -28,10 +28,10 @@ use crate::kernel::{Several, Work};
 use crate::{Gaussian, Real, Recordable};
 pub use features::{FARTHEST, FEATURES, FeatureScale, RATE_GAIN, ReadingFeatures, Starts, TIME_CONSTANTS_S, settled};
 pub use low_pass::{Decay, LowPass};
-use process::{Kernels, Said};
+use process::{Kernels, Prediction};
 pub use process::{LINEAR, Process, kernel};
 pub use quadratic::Quadratic;
-pub use rows::{BLOCK, RowBlock, Rows, block_of};
+pub use rows::{BLOCK, InputRows, RowBlock, block_of};
 pub use triangle::{Triangle, stripe_places, stripes};
 
 /// Number of a filter's outputs that a correction sees: strain, its rate, relaxation, baseline, and the probabilities of
@@ -86,7 +86,7 @@ impl<T: Recordable> InputScale<T> {
 #[derive(Clone, Copy, Debug)]
 pub struct Correction<'a, T, const D: usize, const S: usize = 0> {
     /// Standardised inputs of the training rows; the first are the inducing rows, at most [`INDUCING`].
-    pub rows: Rows<'a, T, D>,
+    pub rows: InputRows<'a, T, D>,
     /// Scales of the inputs.
     pub scales: &'a [InputScale<T>; D],
     /// Strain from all features; outputs of the filter are not seen, whatever their relevance.
@@ -118,7 +118,7 @@ pub struct OneSided<'a, T, const D: usize> {
 #[derive(Clone, Copy, Debug)]
 pub struct Simulated<'a, T, const D: usize> {
     /// Standardised inputs of the rows; outputs of a filter are not seen.
-    pub rows: Rows<'a, T, D>,
+    pub rows: InputRows<'a, T, D>,
     /// Scales of the inputs.
     pub scales: &'a [InputScale<T>; D],
     /// The Gaussian process of the rows.
@@ -180,16 +180,16 @@ impl<T: Real, const D: usize, const S: usize> Correction<'_, T, D, S> {
             let kernel = of.process.kernels(&squares, OUTPUTS, rows.column(OUTPUTS).scale(reading));
             kernels.add(&of.process, kernel, rows.count);
         });
-        let said = kernels.said(like, &of.process, reading);
-        self.widened(said, &of.process, of.process.distance(&outside, OUTPUTS), T::zero())
+        let predicted = kernels.prediction(like, &of.process, reading);
+        self.widened(predicted, &of.process, of.process.distance(&outside, OUTPUTS), T::zero())
     }
 }
 
 impl<T: Recordable, const D: usize, const S: usize> Correction<'_, T, D, S> {
     /// Returns the strain by the filter and the residual process together, and the novelty of the inputs.
-    pub(crate) fn of_residual(&self, said: Said<T>, outside: T, filtered: T) -> (Gaussian<T>, T) {
-        let novelty = T::one() - (T::one() - said.unknown) * (-outside / T::of(NEW)).falling();
-        (self.widened(said, &self.residual, outside, filtered), novelty)
+    pub(crate) fn of_residual(&self, predicted: Prediction<T>, outside: T, filtered: T) -> (Gaussian<T>, T) {
+        let novelty = T::one() - (T::one() - predicted.unknown) * (-outside / T::of(NEW)).falling();
+        (self.widened(predicted, &self.residual, outside, filtered), novelty)
     }
 
     /// The residual process beside a filter: it knows no more than that one where nothing is known.
@@ -197,7 +197,7 @@ impl<T: Recordable, const D: usize, const S: usize> Correction<'_, T, D, S> {
         Process { least_variance: self.residual.least_variance.max(filtered.variance), ..self.residual }
     }
 
-    /// Returns the corrected strain from the mixture of the voices.
+    /// Returns the corrected strain from the mixture of the members.
     pub(crate) fn learned(&self, mixed: Gaussian<T>, novelty: T, birge: T) -> Gaussian<T> {
         let variance = mixed.variance * self.variance_factor + T::of(NOVEL) * self.strain_variance * novelty;
         let anywhere = self.limits.variance_of_anywhere();
@@ -205,9 +205,15 @@ impl<T: Recordable, const D: usize, const S: usize> Correction<'_, T, D, S> {
     }
 
     /// A process' strain on top of `base`, within the limits, with all that its variance gets.
-    pub(crate) fn widened(&self, said: Said<T>, process: &Process<'_, T, D>, outside: T, base: T) -> Gaussian<T> {
-        let variance = said.strain.variance * process.widening + T::of(FAR) * self.strain_variance * outside;
-        Gaussian { mean: self.limits.clamp(base + said.strain.mean), variance }
+    pub(crate) fn widened(
+        &self,
+        predicted: Prediction<T>,
+        process: &Process<'_, T, D>,
+        outside: T,
+        base: T,
+    ) -> Gaussian<T> {
+        let variance = predicted.strain.variance * process.widening + T::of(FAR) * self.strain_variance * outside;
+        Gaussian { mean: self.limits.clamp(base + predicted.strain.mean), variance }
     }
 }
 
@@ -235,7 +241,7 @@ struct Correcting<'a, T, const D: usize, const S: usize> {
 }
 
 impl<T: Real, const D: usize, const S: usize> Work<T> for Correcting<'_, T, D, S> {
-    type Said = Corrected<T, S>;
+    type Output = Corrected<T, S>;
 
     #[inline(always)]
     fn with_lanes<V: Several<Number = T>>(self, like: V) -> Corrected<T, S> {
@@ -261,15 +267,15 @@ impl<T: Real, const D: usize, const S: usize> Work<T> for Correcting<'_, T, D, S
             residual.add(&of.residual, kernel, rows.count);
         });
         let of_readings = |kernels: Kernels<T>, process, first| {
-            let said = kernels.said(like, process, at(&x, first));
-            of.widened(said, process, process.distance(&outside, first), T::zero())
+            let predicted = kernels.prediction(like, process, at(&x, first));
+            of.widened(predicted, process, process.distance(&outside, first), T::zero())
         };
         let direct = of_readings(direct, &of.direct, OUTPUTS);
         let mut of_sides = of.one_sided.iter();
         let one_sided =
             sides.map(|kernels| of_sides.next().map_or(direct, |side| of_readings(kernels, &side.process, side.first)));
-        let said = residual.said(like, &of_residual, strain);
-        let (residual, novelty) = of.of_residual(said, of.residual.distance(&outside, 0), filtered.mean);
+        let predicted = residual.prediction(like, &of_residual, strain);
+        let (residual, novelty) = of.of_residual(predicted, of.residual.distance(&outside, 0), filtered.mean);
         let learned = of.learned(consensus(direct, residual, one_sided), novelty, birge);
         let simulated = of.simulated.map(|simulated| of.of_simulated(like, inputs, &simulated));
         let strain = simulated.map_or(learned, |simulated| mixture([learned, simulated]));
@@ -277,9 +283,9 @@ impl<T: Real, const D: usize, const S: usize> Work<T> for Correcting<'_, T, D, S
     }
 }
 
-/// Combines the voices of a correction. A filter's two voices are combined as a [`mixture`]. A smoother's are, too, after each voice's
+/// Combines the members of a correction. A filter's two members are combined as a [`mixture`]. A smoother's are, too, after each member's
 /// variance has grown by the part of its squared distance from the mixture of the others that both variances do not explain. Of four
-/// voices with different inputs, one that contradicts all others is more likely wrong than it states; of two, nobody knows which
+/// members with different inputs, one that contradicts all others is more likely wrong than it states; of two, nobody knows which
 /// one is wrong.
 #[must_use]
 pub fn consensus<T: Real, const S: usize>(
@@ -287,41 +293,41 @@ pub fn consensus<T: Real, const S: usize>(
     residual: Gaussian<T>,
     one_sided: [Gaussian<T>; S],
 ) -> Gaussian<T> {
-    let voices = [direct, residual].into_iter().chain(one_sided);
+    let members = [direct, residual].into_iter().chain(one_sided);
     if S == 0 {
-        return mixture(voices);
+        return mixture(members);
     }
-    let doubted = |place: usize, voice: Gaussian<T>| {
-        let others = voices.clone().enumerate().filter(|(other, _)| *other != place).map(|(_, other)| other);
+    let doubted = |place: usize, member: Gaussian<T>| {
+        let others = members.clone().enumerate().filter(|(other, _)| *other != place).map(|(_, other)| other);
         let others = mixture(others);
-        let apart = voice.mean - others.mean;
-        let unexplained = (apart * apart - voice.variance - others.variance).max(T::zero());
-        Gaussian { variance: voice.variance + unexplained, ..voice }
+        let apart = member.mean - others.mean;
+        let unexplained = (apart * apart - member.variance - others.variance).max(T::zero());
+        Gaussian { variance: member.variance + unexplained, ..member }
     };
     let sides = core::array::from_fn::<_, S, _>(|side| doubted(2 + side, one_sided[side]));
     mixture([doubted(0, direct), doubted(1, residual)].into_iter().chain(sides))
 }
 
 /// Mean and variance of the mixture of Gaussians, each weighted by its variance to the power −3/2: more than the inverse
-/// variance that is due to independent voices, since several may be wrong together, and the surest is the least so. One that is
+/// variance that is due to independent members, since several may be wrong together, and the surest is the least so. One that is
 /// exact is all that counts; nothing mixed is exactly zero.
 #[must_use]
-pub fn mixture<T: Recordable>(voices: impl IntoIterator<Item = Gaussian<T>, IntoIter: Clone>) -> Gaussian<T> {
-    let voices = voices.into_iter();
+pub fn mixture<T: Recordable>(members: impl IntoIterator<Item = Gaussian<T>, IntoIter: Clone>) -> Gaussian<T> {
+    let members = members.into_iter();
     let none = Gaussian { mean: T::zero(), variance: T::zero() };
-    let least = voices.clone().map(|voice| voice.variance).reduce(T::min).unwrap_or(T::zero());
+    let least = members.clone().map(|member| member.variance).reduce(T::min).unwrap_or(T::zero());
     if least <= T::zero() {
-        return voices.reduce(|a, b| if b.variance < a.variance { b } else { a }).unwrap_or(none);
+        return members.reduce(|a, b| if b.variance < a.variance { b } else { a }).unwrap_or(none);
     }
-    let weighted = |voice: Gaussian<T>| {
-        let ratio = least / voice.variance;
-        (ratio * ratio.sqrt(), voice)
+    let weighted = |member: Gaussian<T>| {
+        let ratio = least / member.variance;
+        (ratio * ratio.sqrt(), member)
     };
-    let weighted = voices.map(weighted);
+    let weighted = members.map(weighted);
     let total = weighted.clone().fold(T::zero(), |sum, (weight, _)| sum + weight);
-    let mean = weighted.clone().fold(T::zero(), |sum, (weight, voice)| sum + weight / total * voice.mean);
-    let spread = |voice: Gaussian<T>| voice.variance + (voice.mean - mean) * (voice.mean - mean);
-    let variance = weighted.fold(T::zero(), |sum, (weight, voice)| sum + weight / total * spread(voice));
+    let mean = weighted.clone().fold(T::zero(), |sum, (weight, member)| sum + weight / total * member.mean);
+    let spread = |member: Gaussian<T>| member.variance + (member.mean - mean) * (member.mean - mean);
+    let variance = weighted.fold(T::zero(), |sum, (weight, member)| sum + weight / total * spread(member));
     Gaussian { mean, variance }
 }
 
@@ -330,7 +336,7 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "tests")]
 
     use super::{
-        BLOCK, Correcting, Correction, FEATURES, INDUCING, InputScale, OUTPUTS, OneSided, Process, RowBlock, Rows,
+        BLOCK, Correcting, Correction, FEATURES, INDUCING, InputRows, InputScale, OUTPUTS, OneSided, Process, RowBlock,
         Simulated, StrainRange, Triangle, block_of, stripes,
     };
     use crate::Gaussian;
@@ -361,14 +367,14 @@ mod tests {
         };
         let scales = [InputScale { mean: 0.1, sd: 0.8, lower: -1.0, upper: 1.2 }; INPUTS];
         let correction = Correction {
-            rows: Rows::new(&rows, ROWS),
+            rows: InputRows::new(&rows, ROWS),
             scales: &scales,
             direct: process(2.0),
             one_sided: [(process(1.5), OUTPUTS), (process(0.7), OUTPUTS + FEATURES + 1)]
                 .map(|(process, first)| OneSided { process, first }),
             residual: process(3.0),
             simulated: Some(Simulated {
-                rows: Rows::new(&rows[3..], ROWS - 3 * BLOCK),
+                rows: InputRows::new(&rows[3..], ROWS - 3 * BLOCK),
                 scales: &scales,
                 process: process(2.5),
             }),

@@ -40,11 +40,11 @@ impl<T: Recordable, const D: usize> Process<'_, T, D> {
 
     /// Returns the process's prediction from the weighted sum of all kernels and the variance that the inducing rows
     /// explain; `first` is the first input.
-    pub(crate) fn said(&self, mean: T, explained: T, first: T) -> Said<T> {
+    pub(crate) fn prediction(&self, mean: T, explained: T, first: T) -> Prediction<T> {
         let prior = T::one() + linear(first * first);
         let unknown = ((prior - explained) / prior).max(T::zero()).min(T::one());
         let latent = (prior * self.variance).max(self.least_variance) * unknown;
-        Said { strain: Gaussian { mean, variance: latent + self.noise }, unknown }
+        Prediction { strain: Gaussian { mean, variance: latent + self.noise }, unknown }
     }
 }
 
@@ -63,7 +63,7 @@ impl<T: Real, const D: usize> Process<'_, T, D> {
 
 /// Prediction of a process at one input.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Said<T> {
+pub(crate) struct Prediction<T> {
     pub strain: Gaussian<T>,
     /// Share of the prior variance that the training rows leave, 0 to 1.
     pub unknown: T,
@@ -107,13 +107,13 @@ impl<T: Real> Kernels<T> {
 
     /// Returns the process's prediction; `first` is the first input.
     #[inline(always)]
-    pub(super) fn said<V: Several<Number = T>, const D: usize>(
+    pub(super) fn prediction<V: Several<Number = T>, const D: usize>(
         &self,
         like: V,
         process: &Process<'_, T, D>,
         first: T,
-    ) -> Said<T> {
-        process.said(self.mean, process.explained.square(like, &self.inducing), first)
+    ) -> Prediction<T> {
+        process.prediction(self.mean, process.explained.square(like, &self.inducing), first)
     }
 }
 

@@ -8,12 +8,12 @@ pub type RowBlock<T, const D: usize> = [[T; BLOCK]; D];
 
 /// Standardised inputs of rows, in blocks; they may lie in flash.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rows<'a, T, const D: usize> {
+pub struct InputRows<'a, T, const D: usize> {
     blocks: &'a [RowBlock<T, D>],
     count: usize,
 }
 
-impl<'a, T, const D: usize> Rows<'a, T, D> {
+impl<'a, T, const D: usize> InputRows<'a, T, D> {
     /// The first `count` rows of blocks; all of them if there are fewer.
     #[must_use]
     pub const fn new(blocks: &'a [RowBlock<T, D>], count: usize) -> Self {

@@ -2,7 +2,7 @@ use nalgebra::{SMatrix, SVector};
 use ohmstrain_model::Scalar;
 
 use super::factor::Factor;
-use super::rows::{Digits, Row, Sources, orthogonalise, regress};
+use super::rows::{Combination, Digits, Sources, orthogonalise, regress};
 use super::{KalmanError, Normal};
 
 /// A function of the state as a filter sees it, `value + slope (x − at) + noise`: a tangent, or a regression.
@@ -39,8 +39,8 @@ impl<T: Scalar, const R: usize, const N: usize> Affine<T, R, N> {
     }
 
     /// Its rows over the sources of `state` and of its own noise.
-    pub(super) fn rows(&self, state: &Normal<T, N>) -> [Row<T, N, R>; R] {
-        core::array::from_fn(|i| Row::of(&self.slope, &state.factor.columns, &self.noise.columns, i))
+    pub(super) fn rows(&self, state: &Normal<T, N>) -> [Combination<T, N, R>; R] {
+        core::array::from_fn(|i| Combination::of(&self.slope, &state.factor.columns, &self.noise.columns, i))
     }
 
     pub(super) fn sources<'a>(&'a self, state: &'a Normal<T, N>) -> Sources<'a, T, N, R> {
@@ -163,7 +163,7 @@ fn condition<T: Scalar, const N: usize, const M: usize>(
     let mut y_rows = line.rows(prior);
     let mut S = SMatrix::<T, M, M>::from_fn(|i, j| y_rows[i].covariance(&y_rows[j], sources));
     let (S_factor, y_digits) = orthogonalise(&mut y_rows, sources, there);
-    let mut s_rows: [Row<T, N, M>; N] = core::array::from_fn(Row::source);
+    let mut s_rows: [Combination<T, N, M>; N] = core::array::from_fn(Combination::source);
     let on_y = regress(&mut s_rows, &y_rows, &S_factor.variances, sources);
     let (s_factor, s_digits) = orthogonalise(&mut s_rows, sources, [true; N]);
     let is_there = |digits: &(usize, Digits)| there[digits.0];

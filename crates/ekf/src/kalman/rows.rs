@@ -14,7 +14,7 @@ use super::factor::Factor;
 
 /// A variable `Σ aᵢ sᵢ + Σ bⱼ nⱼ` of independent sources: N of the state and K of noise.
 #[derive(Clone, Copy)]
-pub(super) struct Row<T, const N: usize, const K: usize> {
+pub(super) struct Combination<T, const N: usize, const K: usize> {
     state: Part<T, N>,
     noise: Part<T, K>,
 }
@@ -76,7 +76,7 @@ impl<T: Scalar, const N: usize> Part<T, N> {
     }
 }
 
-impl<T: Scalar, const N: usize, const K: usize> Row<T, N, K> {
+impl<T: Scalar, const N: usize, const K: usize> Combination<T, N, K> {
     /// Source `i` of the state itself.
     pub(super) fn source(i: usize) -> Self {
         let value = SVector::from_fn(|j, _| if i == j { T::one() } else { T::zero() });
@@ -129,7 +129,7 @@ impl<T: Scalar, const N: usize, const K: usize> Row<T, N, K> {
 ///
 /// A row that is not `wanted` is left out, with a pivot of zero, as if it did not exist.
 pub(super) fn orthogonalise<T: Scalar, const R: usize, const N: usize, const K: usize>(
-    rows: &mut [Row<T, N, K>; R],
+    rows: &mut [Combination<T, N, K>; R],
     sources: Sources<T, N, K>,
     wanted: [bool; R],
 ) -> (Factor<T, R>, [Digits; R]) {
@@ -158,14 +158,14 @@ pub(super) fn sum<T: Scalar, const R: usize, const K: usize>(
     variances: &SVector<T, K>,
 ) -> Factor<T, R> {
     let own = SMatrix::identity();
-    let mut rows: [Row<T, R, K>; R] = core::array::from_fn(|i| Row::of(&own, &first.columns, more, i));
+    let mut rows: [Combination<T, R, K>; R] = core::array::from_fn(|i| Combination::of(&own, &first.columns, more, i));
     orthogonalise(&mut rows, Sources { state: &first.variances, noise: variances }, [true; R]).0
 }
 
 /// Makes rows independent of orthogonal ones: the coefficients of the regression on these. A pivot of zero tells nothing.
 pub(super) fn regress<T: Scalar, const R: usize, const G: usize, const N: usize, const K: usize>(
-    rows: &mut [Row<T, N, K>; R],
-    given: &[Row<T, N, K>; G],
+    rows: &mut [Combination<T, N, K>; R],
+    given: &[Combination<T, N, K>; G],
     pivots: &SVector<T, G>,
     sources: Sources<T, N, K>,
 ) -> SMatrix<T, R, G> {

@@ -2,7 +2,7 @@ use nalgebra::{SMatrix, SVector};
 use ohmstrain_model::Scalar;
 
 use super::filter::solve_lower;
-use super::rows::{Digits, Row, Sources, orthogonalise, regress};
+use super::rows::{Combination, Digits, Sources, orthogonalise, regress};
 use super::{Affine, KalmanError, Normal, Step};
 
 /// Smooths a recording: the state at every step given all readings, by Rauch, Tung and Striebel's recursion.
@@ -66,7 +66,7 @@ fn smooth_step<T: Scalar, const N: usize>(
             predicted.variances[i] = T::zero();
         }
     }
-    let mut s_rows: [Row<T, N, N>; N] = core::array::from_fn(Row::source);
+    let mut s_rows: [Combination<T, N, N>; N] = core::array::from_fn(Combination::source);
     let on_next = regress(&mut s_rows, &next_rows, &predicted.variances, sources);
     let (left, _) = orthogonalise(&mut s_rows, sources, [true; N]);
 
@@ -77,7 +77,8 @@ fn smooth_step<T: Scalar, const N: usize>(
         G.set_column(j, &(lower * (on_next * solve_lower(&predicted.columns, &unit))));
     }
     let left_lower = lower * left.columns;
-    let mut rows: [Row<T, N, N>; N] = core::array::from_fn(|i| Row::of(&G, &next.factor.columns, &left_lower, i));
+    let mut rows: [Combination<T, N, N>; N] =
+        core::array::from_fn(|i| Combination::of(&G, &next.factor.columns, &left_lower, i));
     let (factor, _) =
         orthogonalise(&mut rows, Sources { state: &next.factor.variances, noise: &left.variances }, [true; N]);
     Normal { mean: filtered.mean + G * (next.mean - prior.mean), factor }.checked()

@@ -155,17 +155,17 @@ mod vector {
 /// Work that is done with numbers or with vectors of them.
 pub(crate) trait Work<T> {
     /// Result of the work.
-    type Said;
+    type Output;
 
     /// Does the work with lanes like these.
-    fn with_lanes<V: Several<Number = T>>(self, like: V) -> Self::Said;
+    fn with_lanes<V: Several<Number = T>>(self, like: V) -> Self::Output;
 }
 
 /// Numbers of which the processor may have vectors.
 pub(crate) trait InVectors: Scalar {
     /// Does work with vectors where the processor has some that are worth it. They round as numbers do: results are the same
     /// to the last bit.
-    fn in_vectors<W: Work<Self>>(work: W) -> Option<W::Said>;
+    fn in_vectors<W: Work<Self>>(work: W) -> Option<W::Output>;
     /// Constants of [`falling`](super::Falls::falling) in this precision.
     const FALLING: Falling<Self>;
     /// The bits shifted to where an exponent stands.
@@ -175,7 +175,7 @@ pub(crate) trait InVectors: Scalar {
 
 impl InVectors for f32 {
     #[inline(always)]
-    fn in_vectors<W: Work<Self>>(_: W) -> Option<W::Said> {
+    fn in_vectors<W: Work<Self>>(_: W) -> Option<W::Output> {
         None
     }
 
@@ -211,14 +211,17 @@ impl InVectors for f64 {
 
     #[cfg(all(feature = "simd", any(target_arch = "x86_64", target_feature = "simd128")))]
     #[inline(always)]
-    fn in_vectors<W: Work<Self>>(work: W) -> Option<W::Said> {
-        use fearless_simd::{Level, Simd, SimdBase, f64x4};
+    fn in_vectors<W: Work<Self>>(work: W) -> Option<W::Output> {
+        #[cfg(target_feature = "simd128")]
+        use fearless_simd::f64x2 as Register;
+        #[cfg(target_arch = "x86_64")]
+        use fearless_simd::f64x4 as Register;
+        use fearless_simd::{Level, Simd, SimdBase};
         #[cfg(target_arch = "x86_64")]
         let simd = Level::new().as_avx2()?;
-        // Two registers of WebAssembly's.
         #[cfg(target_feature = "simd128")]
         let simd = Level::new().as_wasm_simd128()?;
-        let like = super::Vector::<_, _, false> { numbers: f64x4::splat(simd, 0.0), simd };
+        let like = super::Vector::<_, _, false> { numbers: Register::splat(simd, 0.0), simd };
         Some(simd.vectorize(
             #[inline(always)]
             || work.with_lanes(like),
@@ -227,7 +230,7 @@ impl InVectors for f64 {
 
     #[cfg(not(all(feature = "simd", any(target_arch = "x86_64", target_feature = "simd128"))))]
     #[inline(always)]
-    fn in_vectors<W: Work<Self>>(_: W) -> Option<W::Said> {
+    fn in_vectors<W: Work<Self>>(_: W) -> Option<W::Output> {
         None
     }
 }

@@ -140,7 +140,7 @@ impl<T: Scalar, S, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, 
 
     /// Takes readings where they are `present`; how they compared, and where what is left is sound.
     #[inline(always)]
-    pub(crate) fn hear<V: Several<Number = T>, X: Switch<V>>(
+    pub(crate) fn update_where<V: Several<Number = T>, X: Switch<V>>(
         &self,
         parts: &mut Parts<V, B>,
         reading: Reading<V>,

@@ -1,6 +1,6 @@
 //! Doubts that make an interval wider than the filter's own, in any precision.
 
-use super::{Flag, Flags, Innovations, NEVER_READ_S, RestSeen, RestWatch, SURPRISING_NIS, Unread};
+use super::{Flag, Flags, Innovations, NEVER_READ_S, RestSeen, RestWatch, SURPRISING_NIS, TurnSeen, TurnWatch, Unread};
 use crate::{Gaussian, Recordable};
 
 /// The numbers behind the widened intervals, also for programs that write a filter in another language.
@@ -53,14 +53,17 @@ pub struct DoubtParts<T> {
     pub per_reading: T,
     /// Variance of the strain at an unknown start.
     pub start: T,
-    /// Variance of a strain that may be anywhere in the limits: there is no more to doubt.
+    /// Variance of a strain that may be anywhere in the limits, or what is not stated if that is more: there is no more to doubt.
     pub most: T,
-    /// Variance of the strain from what a session leaves open of R₀; zero where calibration knows one session only.
-    pub session: T,
+    /// Variance of the strain that the filter does not state: from what a session leaves open of R₀, and from errors on rows that the
+    /// calibration was not fitted to.
+    pub unstated: T,
     /// Bounds on the strain without a reading.
     pub unread: Unread<T>,
     /// Readings of the sensor at rest in calibration, if known.
     pub rest: Option<RestSeen<T>>,
+    /// Turns of the readings in calibration, if known.
+    pub turns: Option<TurnSeen<T>>,
 }
 
 impl DoubtParts<f64> {
@@ -75,9 +78,10 @@ impl DoubtParts<f64> {
             per_reading: T::of(self.per_reading),
             start: T::of(self.start),
             most: T::of(self.most),
-            session: T::of(self.session),
+            unstated: T::of(self.unstated),
             unread: self.unread.to(),
             rest: self.rest.map(|rest| rest.to()),
+            turns: self.turns.map(|turns| turns.to()),
         }
     }
 }
@@ -153,14 +157,15 @@ impl<T: Recordable> Misfit<T> {
 ///     per_reading: 0.3,
 ///     start: 0.03 * 0.03,
 ///     most: unread.anywhere,
-///     session: 0.0,
+///     unstated: 0.0,
 ///     unread,
 ///     rest: None,
+///     turns: None,
 /// };
 /// let mut doubts = Doubts::<f64>::new(parts);
 /// let stated = Gaussian { mean: 0.1, variance: 1e-5 };
 /// let variance = doubts.see(0.0, Some((parts.low, 1.0)), stated);
-/// let (variance, flags) = doubts.widened(0.0, variance);
+/// let (variance, flags) = doubts.widened(Gaussian { variance, ..stated }, 0.0);
 /// assert!(variance > stated.variance && flags.has(Flag::StartUp));
 /// ```
 #[derive(Clone, Copy, Debug)]
@@ -183,6 +188,8 @@ pub struct Doubts<T> {
     corrected: bool,
     /// Watch for another R₀ than calibration's; `None` if calibration does not know the rested sensor's reading.
     pub(crate) rest: Option<RestWatch<T>>,
+    /// Watch for holds that are longer than calibration's; `None` if calibration does not know how long they were.
+    pub(crate) turns: Option<TurnWatch<T>>,
 }
 
 impl<T: Recordable> Doubts<T> {
@@ -201,7 +208,13 @@ impl<T: Recordable> Doubts<T> {
             misfit: Misfit { near: T::zero(), far: T::zero(), innovations: Innovations::none() },
             corrected: false,
             rest: parts.rest.map(|seen| RestWatch::new(seen, false)),
+            turns: parts.turns.map(TurnWatch::new),
         }
+    }
+
+    /// The watch for holds that are longer than calibration's; `None` if calibration does not know how long they were.
+    pub const fn turns(&self) -> Option<&TurnWatch<T>> {
+        self.turns.as_ref()
     }
 
     /// States that the strain is known at the start; `rests` if it is zero.
@@ -225,11 +238,12 @@ impl<T: Recordable> Doubts<T> {
     /// The strain is known now: what was doubted of it is gone.
     pub fn settle(&mut self) {
         (self.fading, self.starts, self.unread_s, self.refused) = (T::zero(), false, T::zero(), false);
+        self.turns.iter_mut().for_each(TurnWatch::settle);
     }
 
     /// Restarts the watch: R₀ of the day is now given.
-    pub fn told_rest(&mut self) {
-        self.rest.iter_mut().for_each(RestWatch::told);
+    pub fn restart_rest_watch(&mut self) {
+        self.rest.iter_mut().for_each(RestWatch::restart);
     }
 
     /// Raises the fading variance if this doubt exceeds what is left of a start.
@@ -253,6 +267,7 @@ impl<T: Recordable> Doubts<T> {
     pub fn see(&mut self, dt_s: T, reading: Option<(T, T)>, stated: Gaussian<T>) -> T {
         self.pass(dt_s);
         let Some((rho, nis)) = reading else { return self.open(stated) };
+        self.watch_turns(rho);
         self.read(rho, nis);
         stated.variance
     }
@@ -286,6 +301,14 @@ impl<T: Recordable> Doubts<T> {
         self.parts.unread.variance(self.unread_s, stated.mean, stated.variance)
     }
 
+    /// Takes a reading that will be used, R/R₀ - 1, and watches for turns of the readings.
+    pub fn watch_turns(&mut self, rho: T) {
+        let passed_s = if self.has_begun() { self.unread_s } else { T::zero() };
+        self.turns.iter_mut().for_each(|turns| {
+            turns.see(passed_s, rho);
+        });
+    }
+
     /// Takes a reading that was used. All that counts is the time since the reading before it, in however many rows.
     ///
     /// After a pause of t seconds the deviation of a start, times (1 - exp(-t/5 s))², is doubted: nothing after a reading that was
@@ -314,9 +337,10 @@ impl<T: Recordable> Doubts<T> {
     }
 
     /// Takes a row on a smoother's way back, which knows no start and nothing that fades: `run_s` after the first row, `dt_s`
-    /// before the reading that comes next.
-    pub fn see_back(&mut self, run_s: T, dt_s: T, reading: Option<(T, T)>) {
+    /// before the reading that comes next; `unturned_s` from the turn of the readings before it to the one after it.
+    pub fn see_back(&mut self, run_s: T, dt_s: T, unturned_s: T, reading: Option<(T, T)>) {
         (self.run_s, self.starts, self.fading) = (run_s, false, T::zero());
+        self.turns.iter_mut().for_each(|turns| turns.lasts(unturned_s));
         if let Some((rho, nis)) = reading {
             self.judge(&Left::after(dt_s), dt_s, rho, nis);
         }
@@ -330,11 +354,13 @@ impl<T: Recordable> Doubts<T> {
         });
     }
 
-    /// Returns the strain's variance with all doubts, and their flags. Readings outside the calibrated range widen it by a
-    /// multiple of their distance times the mean slope. Innovations that are larger than stated widen the interval as they would a weighted
+    /// Returns the variance of a stated strain with all doubts, and their flags. Readings outside the calibrated range widen it by a
+    /// multiple of their distance times the mean slope. Readings that have not turned for longer than in calibration leave nothing but the
+    /// limits of the strain in the end, or a doubt between the strain and rest if they are those of rest. Innovations that are larger than stated widen the interval as they would a weighted
     /// mean's (Birge, *Phys. Rev.* 40 (1932) 207), unless a correction has counted them. So does a rate beyond calibration's. The variance
     /// stays below that without readings.
-    pub fn widened(&self, rate: T, variance: T) -> (T, Flags) {
+    pub fn widened(&self, strain: Gaussian<T>, rate: T) -> (T, Flags) {
+        let Gaussian { mean, variance } = strain;
         let (worth, most, per_reading) = (T::of(DOUBT.worth), self.parts.most, self.parts.per_reading);
         let faster = rate.abs() / self.parts.fastest_per_s;
         let is_fast = faster > T::of(DOUBT.faster);
@@ -345,8 +371,11 @@ impl<T: Recordable> Doubts<T> {
         let outside = self.misfit.outside(&self.parts);
         let rest_off = self.rest.map_or(T::zero(), |rest| rest.off());
         let elsewhere = rest_off * per_reading;
-        let more = (self.fading + outside + elsewhere * elsewhere + self.parts.session).min(most);
-        let is_beyond = is_fast || outside > worth * variance || birge > T::one() + worth;
+        let rests = self.rest.is_some_and(|rest| rest.near_s > T::zero());
+        let doubted = self.turns.map_or(T::zero(), |turns| turns.doubted());
+        let unseen = doubted * doubted * if rests { most.min(mean * mean) } else { most };
+        let more = (self.fading + outside + elsewhere * elsewhere + unseen + self.parts.unstated).min(most);
+        let is_beyond = is_fast || outside + unseen > worth * variance || birge > T::one() + worth;
         let flags = Flags::NONE
             .with(Flag::StartUp, self.starts && self.fading > worth * self.parts.start)
             .with(Flag::Recovering, !self.starts && self.fading > worth * variance)
@@ -367,7 +396,7 @@ mod tests {
     extern crate std;
     use std::vec;
 
-    use super::{DoubtParts, Doubts, Flag, Flags, RestSeen, Unread};
+    use super::{DoubtParts, Doubts, Flag, Flags, RestSeen, TurnSeen, Unread};
     use crate::Gaussian;
 
     const STATED: Gaussian<f64> = Gaussian { mean: 0.1, variance: 1e-6 };
@@ -387,9 +416,10 @@ mod tests {
             per_reading,
             start,
             most,
-            session: 0.0,
+            unstated: 0.0,
             unread,
             rest: Some(rest),
+            turns: None,
         }
     }
 
@@ -399,7 +429,7 @@ mod tests {
         rows.into_iter().for_each(|row| {
             doubts.see(0.1, Some(row), STATED);
         });
-        doubts.widened(0.0, STATED.variance)
+        doubts.widened(STATED, 0.0)
     }
 
     #[test]
@@ -411,12 +441,12 @@ mod tests {
             assert!((variance / STATED.variance / times - 1.0).abs() < 1e-3, "{nis}: {variance}");
             assert_eq!(flags.has(Flag::Extrapolated), times > 1.0);
         }
-        // A correction has heard of them.
+        // The correction has their features, too.
         let mut doubts = Doubts::new(parts(1.0)).of_known_strain(false).of_corrected();
         (0..2000).for_each(|_| {
             doubts.see(0.1, Some((0.5, 4.0)), STATED);
         });
-        let (variance, flags) = doubts.widened(0.0, STATED.variance);
+        let (variance, flags) = doubts.widened(STATED, 0.0);
         // Rows that are 0.1 s apart are pauses of 0.1 s.
         let stated = STATED.variance + 1e-4 * (1.0 - (-0.1_f64 / 5.0).exp()).powi(4);
         assert!((doubts.birge() - 4.0).abs() < 1e-3 && (variance - stated).abs() < 1e-12, "{variance}");
@@ -425,6 +455,30 @@ mod tests {
         let outlier = |k: usize| (0.5, if k == 1990 { 1e6 } else { 0.5 });
         let (variance, flags) = said(parts(1.0), (0..2000).map(outlier));
         assert!((variance - stated).abs() < 1e-12 && flags == Flags::NONE, "{variance} {flags}");
+    }
+
+    /// Readings that turned every 10 s stand still for 13.5 s: half of the way from 12 to 15 s, whether they are those of rest or not.
+    #[test]
+    fn holds_longer_than_those_of_calibration_leave_the_limits_or_rest() {
+        let still = |rests: bool, of_limits: bool| {
+            let turns = Some(TurnSeen { turn: 0.1, longest_s: 10.0 });
+            let most = if of_limits { 0.0075 } else { 1.0 };
+            let rows = vec![(if rests { 0.05 } else { 0.5 }, 0.1); 136];
+            let parts = DoubtParts {
+                turns,
+                most,
+                rest: parts(1.0).rest.map(|rest| RestSeen { tolerance: 0.1, ..rest }),
+                ..parts(1.0)
+            };
+            let (variance, flags) = said(parts, rows);
+            assert!(flags.has(Flag::Extrapolated));
+            // Rows that are 0.1 s apart are pauses of 0.1 s.
+            variance - STATED.variance - 1e-4 * (1.0 - (-0.1_f64 / 5.0).exp()).powi(4)
+        };
+        assert!((still(false, true) - 0.0075 / 4.0).abs() < 1e-9);
+        // The strain is 0.1 away from rest.
+        assert!((still(true, false) - 0.01 / 4.0).abs() < 1e-9);
+        assert!((still(true, true) - 0.0075 / 4.0).abs() < 1e-9);
     }
 
     /// Ten seconds after a reading that was 0.12 beyond the margin: by one's own exponentials.

@@ -51,7 +51,7 @@ pub struct LiveRow<T, S> {
     /// The flags that doubts raise.
     pub doubts: Flags,
     /// The row's reading and its use.
-    pub heard: Heard<T>,
+    pub measured: Measured<T>,
     /// The state predicted at a row whose reading was not used; at one whose reading was, the state is the filter's
     /// ([`LiveFilter::state`]).
     pub look: Option<S>,
@@ -65,15 +65,15 @@ impl<T, S> LiveRow<T, S> {
     /// # Errors
     /// That of the conversion.
     pub fn try_map<R, E>(self, convert: impl FnOnce(S) -> Result<R, E>) -> Result<LiveRow<T, R>, E> {
-        let Self { estimate, stated, doubts, heard, look, pause } = self;
-        Ok(LiveRow { estimate, stated, doubts, heard, look: look.map(convert).transpose()?, pause })
+        let Self { estimate, stated, doubts, measured, look, pause } = self;
+        Ok(LiveRow { estimate, stated, doubts, measured, look: look.map(convert).transpose()?, pause })
     }
 }
 
 /// A reading and its use.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Heard<T> {
+pub struct Measured<T> {
     /// The verdict on it.
     pub verdict: ReadingVerdict,
     /// The reading, R/R₀ - 1 of R₀ as it is followed; `None` if there was none.
@@ -89,7 +89,7 @@ pub struct Heard<T> {
     inflation: T,
 }
 
-impl<T: Real> Heard<T> {
+impl<T: Real> Measured<T> {
     /// Returns the value for a missing reading.
     #[must_use]
     pub fn nothing() -> Self {
@@ -268,7 +268,7 @@ where
     pub fn rest(&mut self, measured: T) -> Result<(), StepError> {
         self.rest_reading = self.rest_reading_at(measured)?;
         self.now.follower = None;
-        self.now.doubts.told_rest();
+        self.now.doubts.restart_rest_watch();
         Ok(())
     }
 
@@ -324,47 +324,51 @@ where
         check_time_step(dt_s)?;
         // Single precision has no square of much more.
         let dt_s = if self.now.doubts.runs() { dt_s.min(T::of(LONGEST_PAUSE_S)) } else { T::zero() };
-        let (heard, look, pause) = self.hear(dt_s, reading)?;
+        let (measured, look, pause) = self.take(dt_s, reading)?;
         let moments = look.as_ref().unwrap_or(&self.now.state).moments();
         let filtered = self.filtered(&moments);
-        self.watch(dt_s, &heard, filtered);
+        self.watch(dt_s, &measured, filtered);
         let stated = self.corrected(look.as_ref().unwrap_or(&self.now.state), &moments, filtered);
         let now = &mut self.now;
-        let nis = heard.nis.unwrap_or(T::zero());
-        let taken = reading.filter(|_| heard.used.is_some()).map(|reading| (reading.value, nis));
+        let nis = measured.nis.unwrap_or(T::zero());
+        let taken = reading.filter(|_| measured.used.is_some()).map(|reading| (reading.value, nis));
         if let (Some(follower), Some((reading, _))) = (&mut now.follower, taken) {
-            heard.jumped.into_iter().for_each(|jump| follower.jumped(jump));
+            measured.jumped.into_iter().for_each(|jump| follower.jumped(jump));
             follower.see(now.doubts.unread_s + dt_s, reading);
         }
         let of_session = |reading| now.follower.map_or(reading, |follower| follower.of_session(reading));
         let doubted = taken.map(|(reading, nis)| (of_session(reading), nis));
-        if heard.verdict.is_refused() {
+        if measured.verdict.is_refused() {
             now.doubts.refuse();
         }
         let open = now.doubts.see(dt_s, doubted, stated);
-        let (widened, doubts) = now.doubts.widened(moments.mean[1], open);
+        let (widened, doubts) = now.doubts.widened(Gaussian { variance: open, ..stated }, moments.mean[1]);
         let (variance, doubts) =
             if self.protections.doubts { (widened, doubts) } else { (stated.variance, Flags::NONE) };
         let strain = Gaussian { variance, ..stated };
-        let flags = Flags::of(heard.verdict).and(doubts);
+        let flags = Flags::of(measured.verdict).and(doubts);
         let estimate = LiveEstimate { strain, rate: Gaussian::marginal(&moments, 1), flags };
-        Ok(LiveRow { estimate, stated, doubts, heard, look, pause })
+        Ok(LiveRow { estimate, stated, doubts, measured, look, pause })
     }
 
-    /// The step that the last row took from `before`, the state then, if its reading was used ([`LiveRow::heard`]).
-    pub fn past_step(&self, before: &E::State, heard: &Heard<T>) -> PastStep<E::State, Repeated<E::Prepared, T>, T> {
-        let from = if heard.inflation > T::one() { before.inflated(heard.inflation) } else { before.clone() };
-        PastStep { from, prepared: self.prepared.1, reading: heard.used }
+    /// The step that the last row took from `before`, the state then, if its reading was used ([`LiveRow::measured`]).
+    pub fn past_step(
+        &self,
+        before: &E::State,
+        measured: &Measured<T>,
+    ) -> PastStep<E::State, Repeated<E::Prepared, T>, T> {
+        let from = if measured.inflation > T::one() { before.inflated(measured.inflation) } else { before.clone() };
+        PastStep { from, prepared: self.prepared.1, reading: measured.used }
     }
 
     /// Takes a reading, if it is one, and looks again where readings have jumped. A row without one is a look ahead from the last:
     /// the state there comes back, and the pause up to it.
     #[allow(clippy::type_complexity, reason = "parts of a row")]
-    fn hear(
+    fn take(
         &mut self,
         dt_s: T,
         reading: Option<Reading<T>>,
-    ) -> Result<(Heard<T>, Option<E::State>, Pause<T>), StepError> {
+    ) -> Result<(Measured<T>, Option<E::State>, Pause<T>), StepError> {
         let mut repeats = self.now.repeats;
         repeats.pass(dt_s);
         let reading = reading.map(|reading| self.now.follower.map_or(reading, |follower| follower.relative(reading)));
@@ -387,14 +391,15 @@ where
         let verdict = turned_down.unwrap_or(guarded.verdict);
         let nis = guarded.advanced.innovation.map(|innovation| innovation.nis);
         let (used, inflation) = (guarded.used.filter(|_| verdict.is_taken()), guarded.inflation);
-        let mut heard = Heard { verdict, reading, used, nis, jumped: None, inflation };
-        let jumped = seen.filter(|_| heard.used.is_some() && verdict != ReadingVerdict::Readmitted).and_then(|seen| {
-            let nis = nis.unwrap_or(T::zero());
-            now.jumps.see(seen.value, nis, self.sieve.jump)
-        });
-        heard.jumped = jumped.filter(|_| heard.surprises());
+        let mut measured = Measured { verdict, reading, used, nis, jumped: None, inflation };
+        let jumped =
+            seen.filter(|_| measured.used.is_some() && verdict != ReadingVerdict::Readmitted).and_then(|seen| {
+                let nis = nis.unwrap_or(T::zero());
+                now.jumps.see(seen.value, nis, self.sieve.jump)
+            });
+        measured.jumped = jumped.filter(|_| measured.surprises());
         (now.repeats, now.streak) = (repeats, guarded.streak);
-        let look = if heard.used.is_some() {
+        let look = if measured.used.is_some() {
             (now.state, now.pause) = (guarded.advanced.state, at_reading(&self.estimator, &self.parts));
             None
         } else {
@@ -402,10 +407,10 @@ where
             moved.into_iter().for_each(|moved| now.state = moved);
             Some(guarded.advanced.state)
         };
-        if heard.jumped.is_some() {
+        if measured.jumped.is_some() {
             now.state = now.state.beside(&self.fresh, T::of(BESIDE_SHARE));
         }
-        Ok((heard, look, since))
+        Ok((measured, look, since))
     }
 
     /// Prepares the way over a pause, unless it is.
@@ -417,9 +422,9 @@ where
     }
 
     /// Passes a reading that the filter has used to the correction.
-    fn watch(&mut self, dt_s: T, heard: &Heard<T>, filtered: Gaussian<T>) {
+    fn watch(&mut self, dt_s: T, measured: &Measured<T>, filtered: Gaussian<T>) {
         if let Some(watched) = &mut self.now.watched {
-            watched.step_unless(heard.surprises(), dt_s, heard.used.map(|used| used.value));
+            watched.step_unless(measured.surprises(), dt_s, measured.used.map(|used| used.value));
             if !watched.is_waiting() {
                 self.now.known_variance = filtered.variance;
             }

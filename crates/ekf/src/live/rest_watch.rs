@@ -109,10 +109,10 @@ impl<T: Recordable> RestWatch<T> {
     /// let seen = RestSeen { rested: 0.05, tolerance: 0.05, lasts_s: 10.0, sign: 1.0, end: 0.02 };
     /// let mut watch = RestWatch::<f64>::new(seen, true);
     /// watch.see(0.0, seen.rested + 0.1);
-    /// watch.told();
+    /// watch.restart();
     /// assert_eq!(watch.off(), 0.0);
     /// ```
-    pub fn told(&mut self) {
+    pub fn restart(&mut self) {
         *self = Self::new(self.seen, self.rests);
     }
 

@@ -11,8 +11,8 @@ use crate::{Curve, Reading, SparseEkf, StepError, Switch};
 const LOOSER: f64 = 16.0;
 
 /// Reading of a step, present or missing. There are two types: a program that always has a reading has no code for pauses.
-pub(crate) trait Hearing<T: Scalar>: Copy {
-    fn reading(self) -> Option<Reading<T>>;
+pub(crate) trait StepReading<T: Scalar>: Copy {
+    fn as_option(self) -> Option<Reading<T>>;
 
     /// Returns the reading for a further try of a refused step; the refusal if another try is of no use.
     fn again<S: Switch<T>, const B: usize, const N: usize, G: Curve<T>>(
@@ -23,9 +23,9 @@ pub(crate) trait Hearing<T: Scalar>: Copy {
     ) -> Result<Self, StepError>;
 }
 
-impl<T: Scalar> Hearing<T> for Reading<T> {
+impl<T: Scalar> StepReading<T> for Reading<T> {
     #[inline(always)]
-    fn reading(self) -> Option<Self> {
+    fn as_option(self) -> Option<Self> {
         Some(self)
     }
 
@@ -39,9 +39,9 @@ impl<T: Scalar> Hearing<T> for Reading<T> {
     }
 }
 
-impl<T: Scalar> Hearing<T> for Option<Reading<T>> {
+impl<T: Scalar> StepReading<T> for Option<Reading<T>> {
     #[inline(always)]
-    fn reading(self) -> Self {
+    fn as_option(self) -> Self {
         self
     }
 
@@ -53,7 +53,7 @@ impl<T: Scalar> Hearing<T> for Option<Reading<T>> {
     ) -> Result<Self, StepError> {
         match self {
             None if refused.is_of_the_reading() && tries <= MOST_TRIES => Ok(None),
-            heard => kernel.coarser(heard, tries, refused).map(Some),
+            reading => kernel.coarser(reading, tries, refused).map(Some),
         }
     }
 }

@@ -127,10 +127,10 @@ impl<'a, T: Real, const N: usize, const L: usize, const K: usize> Children<'a, T
     }
 
     /// Makes the probabilities sum to one and drops what is negligible.
-    pub(crate) fn normalise<const B: usize>(&mut self, heirs: &mut impl Recorder<T, B>) -> Result<(), StepError> {
+    pub(crate) fn normalise<const B: usize>(&mut self, recorder: &mut impl Recorder<T, B>) -> Result<(), StepError> {
         let heaviest = self.kept.shares().iter().fold(T::zero(), |a, b| if b.weight > a { b.weight } else { a });
         let least = heaviest * T::of(LEAST_WEIGHT);
-        heirs.renumbered(|place| {
+        recorder.renumbered(|place| {
             let (before, from_here) = self.kept.shares().split_at_checked(place)?;
             let lighter = before.iter().filter(|share| !(share.weight > least)).count();
             from_here.first().is_some_and(|share| share.weight > least).then_some(place - lighter)

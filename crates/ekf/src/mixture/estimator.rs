@@ -54,7 +54,7 @@ macro_rules! mixture_filter {
                 reading: Option<Reading<T>>,
                 next: &mut Self::State,
             ) -> Result<Option<$crate::Innovation<T>>, StepError> {
-                prepared.step_into(state, reading, next)?.map(|said| said.innovation()).transpose()
+                prepared.step_into(state, reading, next)?.map(|residual| residual.innovation()).transpose()
             }
 
             fn smooth_back(
@@ -136,19 +136,21 @@ macro_rules! mixture_steps {
             reading: Option<Reading<T>>,
         ) -> Result<Option<MixtureResidual<T>>, StepError> {
             match reading {
-                Some(reading) => self.step_hearing(state, reading),
-                None => self.step_hearing(state, reading),
+                Some(reading) => self.step_with(state, reading),
+                None => self.step_with(state, reading),
             }
         }
 
         #[inline(always)]
-        fn step_hearing<const L: usize>(
+        fn step_with<const L: usize>(
             &self,
             state: &mut Mixture<T, N, L, K>,
-            heard: impl Hearing<T>,
+            reading: impl StepReading<T>,
         ) -> Result<Option<MixtureResidual<T>>, StepError> {
-            match self.step_once(state, heard) {
-                Err(refused) => self.step_again(state, heard, refused, |state, heard| self.step_once(state, heard)),
+            match self.step_once(state, reading) {
+                Err(refused) => {
+                    self.step_again(state, reading, refused, |state, reading| self.step_once(state, reading))
+                }
                 taken => taken,
             }
         }
@@ -158,10 +160,10 @@ macro_rules! mixture_steps {
         fn step_once<const L: usize>(
             &self,
             state: &mut Mixture<T, N, L, K>,
-            heard: impl Hearing<T>,
+            reading: impl StepReading<T>,
         ) -> Result<Option<MixtureResidual<T>>, StepError> {
             let mut next = Mixture::empty();
-            let residual = self.step_recorded(state, heard.reading(), &mut next, &mut ())?;
+            let residual = self.step_recorded(state, reading.as_option(), &mut next, &mut ())?;
             *state = next;
             Ok(residual)
         }
@@ -179,19 +181,19 @@ macro_rules! mixture_steps {
 
         #[cold]
         #[inline(never)]
-        fn step_again<const L: usize, H: Hearing<T>>(
+        fn step_again<const L: usize, H: StepReading<T>>(
             &self,
             state: &mut Mixture<T, N, L, K>,
-            mut heard: H,
+            mut reading: H,
             mut refused: StepError,
             once: impl Fn(&mut Mixture<T, N, L, K>, H) -> Result<Option<MixtureResidual<T>>, StepError>,
         ) -> Result<Option<MixtureResidual<T>>, StepError> {
             let (mut from, mut tries) = (*state, 0);
             loop {
                 tries += 1;
-                heard = heard.again(&self.kernel, tries, refused)?;
+                reading = reading.again(&self.kernel, tries, refused)?;
                 loosen(from.shares_mut(), tries);
-                match once(&mut from, heard) {
+                match once(&mut from, reading) {
                     Err(error) => refused = error,
                     taken => {
                         *state = from;
@@ -232,11 +234,11 @@ macro_rules! mixture_steps {
             mut reading: Option<Reading<T>>,
             next: &Mixture<T, N, L, K>,
         ) -> Result<Mixture<T, N, L, K>, StepError> {
-            let (mut heirs, mut smoothed, mut tries) = (Mixture::empty(), *filtered, 0);
+            let (mut components, mut smoothed, mut tries) = (Mixture::empty(), *filtered, 0);
             // As forward, with every try.
             let following = loop {
                 let mut following = Following::<T, B, N, L, K>::new(self.model(), self.kernel.dt_s());
-                match self.step_recorded(&smoothed, reading, &mut heirs, &mut following) {
+                match self.step_recorded(&smoothed, reading, &mut components, &mut following) {
                     Ok(_) => break following,
                     Err(refused) => {
                         tries += 1;
@@ -245,7 +247,7 @@ macro_rules! mixture_steps {
                     }
                 }
             };
-            following.lineage.smooth(smoothed.shares_mut(), heirs.shares(), next.shares());
+            following.lineage.smooth(smoothed.shares_mut(), components.shares(), next.shares());
             Ok(smoothed)
         }
     };

@@ -185,7 +185,7 @@ impl<V: Several> Weighed<V> {
 }
 
 /// Children that have been predicted, before the reading.
-pub(crate) struct Newborn<'a, V: Lanes, X: Switch<V>, const B: usize> {
+pub(crate) struct PredictedChildren<'a, V: Lanes, X: Switch<V>, const B: usize> {
     pub parts: &'a mut Parts<V, B>,
     pub phase: Phase,
     pub prior: V,
@@ -198,7 +198,7 @@ pub(crate) struct Newborn<'a, V: Lanes, X: Switch<V>, const B: usize> {
 }
 
 /// Children after the reading.
-pub(crate) struct Heard<V: Lanes> {
+pub(crate) struct UpdatedChildren<V: Lanes> {
     pub prior: V,
     pub alive: V::Mask,
     /// Lanes whose numbers are sound.
@@ -213,24 +213,24 @@ impl<T: Real, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> SparseE
     #[inline(always)]
     pub(crate) fn weigh<V: Several<Number = T>, X: Switch<V>>(
         &self,
-        newborn: Newborn<'_, V, X, B>,
+        children: PredictedChildren<'_, V, X, B>,
         reading: Option<Reading<V>>,
         weighing: &Weighing<T>,
-    ) -> Heard<V> {
-        let Newborn { parts, phase, prior, spread, per_inside, alive } = newborn;
+    ) -> UpdatedChildren<V> {
+        let PredictedChildren { parts, phase, prior, spread, per_inside, alive } = children;
         let nothing = prior.nothing();
         let mut residual = Residual { innovation: nothing, variance: nothing, nis: nothing };
         let mut weight = Weight { factor: prior, exponent: nothing };
         let sound;
         if let Some(reading) = reading {
-            (residual, sound) = self.hear(parts, reading, Some(phase), spread, alive);
+            (residual, sound) = self.update_where(parts, reading, Some(phase), spread, alive);
             weight = weighing.likelihood::<V, X>(prior, &residual);
         } else {
             sound = parts.is_sound::<N>(parts.variances::<N>());
         }
         let strain = (parts.strain, parts.strain_variance);
         let [more_inside, per_inside] = weighing.of_limits::<V, X>(strain, per_inside, alive);
-        Heard { prior, alive, sound, residual, weighed: Weighed { weight, more_inside, per_inside } }
+        UpdatedChildren { prior, alive, sound, residual, weighed: Weighed { weight, more_inside, per_inside } }
     }
 }
 

@@ -10,11 +10,11 @@ use ohmstrain_model::{Phase, SwitchedModel, Turning};
 
 use crate::Real;
 use crate::kernel::{Course, Parts, Several};
-use crate::mixture::again::{Hearing, loosen};
-use crate::mixture::brood::{Breeding, Breeds, Parents, Trail};
+use crate::mixture::again::{StepReading, loosen};
 use crate::mixture::estimator::{mixture_filter, mixture_steps, over_phases};
-use crate::mixture::evidence::{Heard, Newborn, Weighing};
+use crate::mixture::evidence::{PredictedChildren, UpdatedChildren, Weighing};
 use crate::mixture::lineage::{Following, Recorder};
+use crate::mixture::spawn::{ChildTrace, MixtureStep, Parents, Spawns};
 use crate::mixture::state::Mixture;
 use crate::mixture::switching::fresh_rate;
 use crate::{
@@ -48,11 +48,12 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
         next: &mut Mixture<T, N, L, K>,
         recorder: &mut impl Recorder<T, B>,
     ) -> Result<Option<MixtureResidual<T>>, StepError> {
-        Breeding { filter: self, state, reading, next: &mut *next, open: false, branches: PhantomData }.done(recorder)
+        MixtureStep { filter: self, state, reading, next: &mut *next, open: false, branches: PhantomData }
+            .done(recorder)
     }
 }
 
-impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: Curve<T>> Breeds<T, B, N>
+impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: Curve<T>> Spawns<T, B, N>
     for Hypotheses<T, B, N, K, S, G>
 {
     type Switch = S;
@@ -78,14 +79,14 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
     }
 
     #[inline(always)]
-    fn brood<V: Several<Number = T>, X: Switch<V>>(
+    fn spawn<V: Several<Number = T>, X: Switch<V>>(
         &self,
         parts: &mut Parts<V, B>,
         parents: &Parents<V>,
         phase: Phase,
         reading: Option<Reading<V>>,
-        trail: &mut impl Trail<V, B>,
-    ) -> Option<Heard<V>> {
+        trace: &mut impl ChildTrace<V, B>,
+    ) -> Option<UpdatedChildren<V>> {
         let probability = parents.follows[phase.index()];
         let alive = V::both(parents.there, probability.nothing().less(probability));
         if V::none(alive) {
@@ -99,12 +100,12 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
             }
         }
         let course = Course::Known(phase);
-        trail.starts(parts, begins, &course);
+        trace.starts(parts, begins, &course);
         let spread = self.kernel.predict_as::<V, X>(parts, course);
-        trail.ahead(parts);
+        trace.ahead(parts);
         let (prior, per_inside) = (parents.weight * probability, parents.per_inside);
-        let newborn = Newborn { parts, phase, prior, spread, per_inside, alive };
-        Some(self.kernel.weigh(newborn, reading, &self.weighing))
+        let children = PredictedChildren { parts, phase, prior, spread, per_inside, alive };
+        Some(self.kernel.weigh(children, reading, &self.weighing))
     }
 }
 

@@ -12,7 +12,7 @@ use ohmstrain_model::{Phase, SwitchedModel};
 use crate::Real;
 use crate::kernel::{Course, Parts};
 use crate::mixture::LEAST_WEIGHT;
-use crate::mixture::again::{Hearing, loosen};
+use crate::mixture::again::{StepReading, loosen};
 use crate::mixture::estimator::{mixture_filter, over_phases};
 use crate::mixture::evidence::{Weighing, Weight};
 use crate::mixture::predicted::Predicted;
@@ -61,14 +61,14 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, 
         state: &mut PhaseMixture<T, N, L>,
         reading: Option<Reading<T>>,
     ) -> Result<Option<MixtureResidual<T>>, StepError> {
-        let (mut heard, mut before, mut tries) = (reading, None, 0);
+        let (mut reading, mut before, mut tries) = (reading, None, 0);
         // One place for the first try and for all others: a program has the step once.
         loop {
-            match self.step_once(state, heard) {
+            match self.step_once(state, reading) {
                 Err(refused) => {
                     tries += 1;
                     let before = before.get_or_insert(*state);
-                    heard = self.again(state, heard, tries, refused).inspect_err(|_| *state = *before)?;
+                    reading = self.again(state, reading, tries, refused).inspect_err(|_| *state = *before)?;
                 }
                 taken => return taken,
             }
@@ -81,13 +81,13 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, 
     fn again<const L: usize>(
         &self,
         state: &mut PhaseMixture<T, N, L>,
-        heard: Option<Reading<T>>,
+        reading: Option<Reading<T>>,
         tries: u32,
         refused: StepError,
     ) -> Result<Option<Reading<T>>, StepError> {
-        let heard = heard.again(&self.kernel, tries, refused)?;
+        let reading = reading.again(&self.kernel, tries, refused)?;
         loosen(&mut state.modes, tries);
-        Ok(heard)
+        Ok(reading)
     }
 
     /// [`Self::step`] into a state that is there already, whatever it was.

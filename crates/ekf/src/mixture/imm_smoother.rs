@@ -61,7 +61,7 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, 
             }
             let log_weight = weight.ln();
             let descent =
-                Descent { transition, predicted: *belief, posterior: *belief, log_weight, heir: phase.index() };
+                Descent { transition, predicted: *belief, posterior: *belief, log_weight, component: phase.index() };
             mixing.put(from.index(), phase, Some(descent));
         }
         if total > T::zero() {

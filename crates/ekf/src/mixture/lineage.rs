@@ -14,20 +14,20 @@ use crate::smooth::rts_step;
 /// Recorder of every child that a step of a filter of hypotheses makes. The filter itself uses `()`, which records nothing.
 pub(crate) trait Recorder<T: Real, const B: usize> {
     /// True if it wants a call for each child.
-    const LISTENS: bool = true;
+    const RECORDS: bool = true;
 
     /// A child was put into the new mixture, merged or alone.
-    fn born(&mut self, _birth: &Birth<'_, T, B>, _added: Added) {}
+    fn record(&mut self, _record: &ChildRecord<'_, T, B>, _added: Added) {}
     /// The contents of every place moved to another one, or nowhere.
     fn renumbered(&mut self, _new_place: impl Fn(usize) -> Option<usize>) {}
 }
 
 impl<T: Real, const B: usize> Recorder<T, B> for () {
-    const LISTENS: bool = false;
+    const RECORDS: bool = false;
 }
 
-/// A child at its birth.
-pub(crate) struct Birth<'a, T, const B: usize> {
+/// A child, and the step that led to it.
+pub(crate) struct ChildRecord<'a, T, const B: usize> {
     /// Index of the parent hypothesis.
     pub parent: usize,
     pub phase: Phase,
@@ -58,7 +58,7 @@ pub(crate) struct Descent<T, const N: usize, const L: usize> {
     pub posterior: Belief<T, N, L>,
     /// Logarithm of its share of the new mixture, not normalised.
     pub log_weight: T,
-    pub heir: usize,
+    pub component: usize,
 }
 
 /// Recorder of a step of a sensor's filter: its linearisations are those of the model.
@@ -89,39 +89,39 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize
         Self { lineage: Lineage::new(), model, step: model.prepare(dt_s) }
     }
 
-    fn transition(&self, birth: &Birth<'_, T, B>) -> Transition<T, N, L> {
-        let from = whole::<T, B, N, L>(birth.from);
-        let direction = match birth.course {
+    fn transition(&self, record: &ChildRecord<'_, T, B>) -> Transition<T, N, L> {
+        let from = whole::<T, B, N, L>(record.from);
+        let direction = match record.course {
             Course::Known(phase) => Direction::Known(phase),
             Course::Within(phase, turning) => Direction::Within { phase, turning },
             Course::Uncertain => self.model.uncertain_direction(&self.step, &from.covariance),
         };
         let transition = self.model.transition(&self.step, &from.mean, direction);
-        if birth.begins { through_renewal(transition, from.covariance[(1, 1)]) } else { transition }
+        if record.begins { through_renewal(transition, from.covariance[(1, 1)]) } else { transition }
     }
 }
 
 impl<T: Real, const B: usize, const N: usize, const L: usize, const K: usize> Recorder<T, B>
     for Following<'_, T, B, N, L, K>
 {
-    fn born(&mut self, birth: &Birth<'_, T, B>, added: Added) {
-        let heir = match added {
-            Added::To(heir) => heir,
-            Added::InsteadOf(heir, into) => {
-                self.lineage.renumber(|place| if place == heir { into } else { Some(place) });
-                heir
+    fn record(&mut self, record: &ChildRecord<'_, T, B>, added: Added) {
+        let component = match added {
+            Added::To(component) => component,
+            Added::InsteadOf(component, into) => {
+                self.lineage.renumber(|place| if place == component { into } else { Some(place) });
+                component
             }
-            Added::Nowhere => return self.lineage.put(birth.parent, birth.phase, None),
+            Added::Nowhere => return self.lineage.put(record.parent, record.phase, None),
         };
-        let Weighed { weight, more_inside, .. } = *birth.weighed;
+        let Weighed { weight, more_inside, .. } = *record.weighed;
         let descent = Descent {
-            transition: self.transition(birth),
-            predicted: whole(birth.predicted),
-            posterior: whole(birth.posterior),
+            transition: self.transition(record),
+            predicted: whole(record.predicted),
+            posterior: whole(record.posterior),
             log_weight: (weight.factor * more_inside).ln() + weight.exponent,
-            heir,
+            component,
         };
-        self.lineage.put(birth.parent, birth.phase, Some(descent));
+        self.lineage.put(record.parent, record.phase, Some(descent));
     }
 
     fn renumbered(&mut self, new_place: impl Fn(usize) -> Option<usize>) {
@@ -179,26 +179,31 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Lineage<T, N, L, K
     fn renumber(&mut self, new_place: impl Fn(usize) -> Option<usize>) {
         for place in self.children.iter_mut().flatten() {
             let Some(child) = place else { continue };
-            match new_place(child.heir) {
-                Some(heir) => child.heir = heir,
+            match new_place(child.component) {
+                Some(component) => child.component = component,
                 None => *place = None,
             }
         }
     }
 
     /// The hypotheses at the beginning of the step given all readings, into `smoothed`, which are those as they were filtered.
-    /// `heirs` are those that the step made, `next` the same ones given all readings.
-    pub(crate) fn smooth(&self, smoothed: &mut [Share<T, N, L>], heirs: &[Share<T, N, L>], next: &[Share<T, N, L>]) {
-        let totals: [T; K] = core::array::from_fn(|heir| self.log_total(heir));
+    /// `components` are those that the step made, `next` the same ones given all readings.
+    pub(crate) fn smooth(
+        &self,
+        smoothed: &mut [Share<T, N, L>],
+        components: &[Share<T, N, L>],
+        next: &[Share<T, N, L>],
+    ) {
+        let totals: [T; K] = core::array::from_fn(|component| self.log_total(component));
         let mut total = T::zero();
         for (parent, children) in smoothed.iter_mut().zip(&self.children) {
             let ways: [(T, Belief<T, N, L>); 3] = core::array::from_fn(|phase| {
                 let way = children.get(phase).and_then(|child| {
                     let child = child.as_ref()?;
-                    let (merged, heir) = (heirs.get(child.heir)?, next.get(child.heir)?);
-                    let share = heir.weight * (child.log_weight - *totals.get(child.heir)?).exp();
+                    let (merged, component) = (components.get(child.component)?, next.get(child.component)?);
+                    let share = component.weight * (child.log_weight - *totals.get(child.component)?).exp();
                     let back = || {
-                        let own = child.unmerged(&merged.belief, &heir.belief);
+                        let own = child.unmerged(&merged.belief, &component.belief);
                         let back = rts_step(&parent.belief, &child.transition, &child.predicted, &own);
                         if is_astray(&back, &parent.belief) { parent.belief } else { back }
                     };
@@ -218,10 +223,10 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Lineage<T, N, L, K
     }
 
     /// Logarithm of the sum of the weights that were merged into a place.
-    fn log_total(&self, heir: usize) -> T {
+    fn log_total(&self, component: usize) -> T {
         let weights = || {
             let all = self.children.iter().flatten().flatten();
-            all.filter(|child| child.heir == heir).map(|child| child.log_weight)
+            all.filter(|child| child.component == component).map(|child| child.log_weight)
         };
         let Some(heaviest) = weights().reduce(|a, b| a.max(b)) else { return T::zero() };
         heaviest + weights().fold(T::zero(), |sum, weight| sum + (weight - heaviest).exp()).ln()

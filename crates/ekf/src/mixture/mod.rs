@@ -1,5 +1,4 @@
 mod again;
-pub(crate) mod brood;
 mod children;
 mod estimator;
 pub(crate) mod evidence;
@@ -12,6 +11,7 @@ pub(crate) mod pair;
 mod pause;
 mod predicted;
 pub(crate) mod sign_split;
+pub(crate) mod spawn;
 mod state;
 #[cfg(feature = "serde")]
 mod stored;

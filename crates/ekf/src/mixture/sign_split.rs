@@ -10,12 +10,12 @@ use ohmstrain_model::{Phase, SwitchedModel, Turning};
 
 use crate::Real;
 use crate::kernel::{Course, Parts, Several, side_of};
-use crate::mixture::again::{Hearing, loosen};
-use crate::mixture::brood::{Breeding, Breeds, Parents, Trail};
+use crate::mixture::again::{StepReading, loosen};
 use crate::mixture::estimator::{mixture_filter, mixture_steps};
-use crate::mixture::evidence::{Heard, Newborn, Weighing};
+use crate::mixture::evidence::{PredictedChildren, UpdatedChildren, Weighing};
 use crate::mixture::lineage::{Following, Recorder};
 use crate::mixture::pause::Pause;
+use crate::mixture::spawn::{ChildTrace, MixtureStep, Parents, Spawns};
 use crate::mixture::state::Mixture;
 use crate::mixture::switching::{forgets_direction_s, fresh_rate, longest_cut_s};
 use crate::{
@@ -104,14 +104,15 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
             None => state.pause().goes_on(self.kernel.dt_s(), self.forgets_direction_s),
             Some(_) => Pause::over(),
         };
-        let said = Breeding { filter: self, state, reading, next: &mut *next, open: pause.open, branches: PhantomData }
-            .done(recorder)?;
+        let residual =
+            MixtureStep { filter: self, state, reading, next: &mut *next, open: pause.open, branches: PhantomData }
+                .done(recorder)?;
         next.set_pause(pause);
-        Ok(said)
+        Ok(residual)
     }
 }
 
-impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: Curve<T>> Breeds<T, B, N>
+impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: Curve<T>> Spawns<T, B, N>
     for SignSplit<T, B, N, K, S, G>
 {
     type Switch = S;
@@ -140,14 +141,14 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
     }
 
     #[inline(always)]
-    fn brood<V: Several<Number = T>, X: Switch<V>>(
+    fn spawn<V: Several<Number = T>, X: Switch<V>>(
         &self,
         parts: &mut Parts<V, B>,
         parents: &Parents<V>,
         phase: Phase,
         reading: Option<Reading<V>>,
-        trail: &mut impl Trail<V, B>,
-    ) -> Option<Heard<V>> {
+        trace: &mut impl ChildTrace<V, B>,
+    ) -> Option<UpdatedChildren<V>> {
         let probability = parents.follows[phase.index()];
         let mut alive = V::both(parents.there, probability.nothing().less(probability));
         if V::none(alive) {
@@ -172,9 +173,9 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
             None if moves && V::none(begins) => Course::Uncertain,
             _ => Course::Known(phase),
         };
-        trail.starts(parts, begins, &course);
+        trace.starts(parts, begins, &course);
         let spread = self.kernel.predict_as::<V, X>(parts, course);
-        trail.ahead(parts);
+        trace.ahead(parts);
         let mut prior = parents.weight * probability;
         if moves && parents.turning.is_some() {
             let mass = parts.cut_rate::<X, N>(side, self.weighing.clear(), alive);
@@ -182,12 +183,12 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
             if V::none(alive) {
                 return None;
             }
-            // After a hold the chain has said how likely this direction is; none of it goes to the other.
-            let said = V::both(begins, mass.literal(0.5).less(mass));
-            prior = V::pick(said, prior, prior * mass);
+            // After a hold the chain gives the probability of this direction; none of it goes to the other.
+            let given = V::both(begins, mass.literal(0.5).less(mass));
+            prior = V::pick(given, prior, prior * mass);
         }
-        let newborn = Newborn { parts, phase, prior, spread, per_inside: parents.per_inside, alive };
-        Some(self.kernel.weigh(newborn, reading, &self.weighing))
+        let children = PredictedChildren { parts, phase, prior, spread, per_inside: parents.per_inside, alive };
+        Some(self.kernel.weigh(children, reading, &self.weighing))
     }
 }
 

@@ -9,9 +9,9 @@ use nalgebra::{SMatrix, vector};
 use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, Phase, SensorLaw, StrainRange, SwitchedModel};
 use proptest::prelude::*;
 
-use super::brood::{Breeding, Breeds};
 use super::children::Children;
 use super::evidence::{Weighed, Weighing, Weight};
+use super::spawn::{MixtureStep, Spawns};
 use super::state::Share;
 use super::*;
 use crate::kernel::{Parts, side_of};
@@ -284,12 +284,13 @@ fn heard(k: usize) -> Option<Reading<f64>> {
     (k % 7 != 3).then_some(Reading { value: slow + noise + wild, extra_variance: 1e-7 })
 }
 
-fn in_vectors_and_one_by_one<F: Breeds<f64, 2, 5>>(filter: &F, start: &Belief<f64, 5, 15>) -> usize {
+fn in_vectors_and_one_by_one<F: Spawns<f64, 2, 5>>(filter: &F, start: &Belief<f64, 5, 15>) -> usize {
     let mut state = Mixture::<f64, 5, 15, 8>::single(*start, Phase::Hold);
     let (mut together, mut alone, mut most) = (Mixture::empty(), Mixture::empty(), 0);
     for k in 0..3000 {
         let step = |next, listens: bool| {
-            let step = Breeding { filter, state: &state, reading: heard(k), next, open: false, branches: PhantomData };
+            let step =
+                MixtureStep { filter, state: &state, reading: heard(k), next, open: false, branches: PhantomData };
             if listens { step.done(&mut Listener) } else { step.done(&mut ()) }
         };
         assert_eq!(step(&mut together, false), step(&mut alone, true), "row {k}");

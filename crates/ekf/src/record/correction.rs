@@ -1,7 +1,7 @@
 use super::{Expression, Function, Writer, write_down};
 use crate::Gaussian;
 use crate::correction::{
-    Correction, FILTER_INPUTS, InputScale, OUTPUTS, Process, Quadratic, Rows, Simulated, Triangle, mixture,
+    Correction, FILTER_INPUTS, InputRows, InputScale, OUTPUTS, Process, Quadratic, Simulated, Triangle, mixture,
 };
 use ohmstrain_model::{Number, StrainRange};
 use std::format;
@@ -62,8 +62,8 @@ impl Correction<'_, f32, FILTER_INPUTS> {
     pub fn write_simulated(&self, of: &Simulated<'_, f32, FILTER_INPUTS>) -> Function {
         write_down(|writer| {
             let (correction, process) = (self.numbers(), process(&of.process));
-            let said = process.said(writer.input("sum"), Number::of(0.0), writer.input("reading"));
-            give(writer, correction.widened(said, &process, writer.input("outside"), Number::of(0.0)));
+            let predicted = process.prediction(writer.input("sum"), Number::of(0.0), writer.input("reading"));
+            give(writer, correction.widened(predicted, &process, writer.input("outside"), Number::of(0.0)));
         })
     }
 
@@ -73,9 +73,10 @@ impl Correction<'_, f32, FILTER_INPUTS> {
     pub fn write_direct(&self) -> Function {
         write_down(|writer| {
             let correction = self.numbers();
-            let said = correction.direct.said(writer.input("sum"), writer.input("explained"), writer.input("reading"));
+            let predicted =
+                correction.direct.prediction(writer.input("sum"), writer.input("explained"), writer.input("reading"));
             let outside = writer.input("outside");
-            give(writer, correction.widened(said, &correction.direct, outside, Number::of(0.0)));
+            give(writer, correction.widened(predicted, &correction.direct, outside, Number::of(0.0)));
         })
     }
 
@@ -87,14 +88,14 @@ impl Correction<'_, f32, FILTER_INPUTS> {
             let correction = self.numbers();
             let filtered = Gaussian { mean: writer.input("filtered"), variance: writer.input("filtered_variance") };
             let residual = correction.residual_beside(filtered);
-            let said = residual.said(writer.input("sum"), writer.input("explained"), writer.input("strain"));
-            let (told, novelty) = correction.of_residual(said, writer.input("outside"), filtered.mean);
-            give(writer, told);
+            let predicted = residual.prediction(writer.input("sum"), writer.input("explained"), writer.input("strain"));
+            let (corrected, novelty) = correction.of_residual(predicted, writer.input("outside"), filtered.mean);
+            give(writer, corrected);
             writer.give("novelty", novelty);
         })
     }
 
-    /// Records the variance of the corrected strain, given the variance of the voices' mixture, `novelty` and `birge`.
+    /// Records the variance of the corrected strain, given the variance of the members' mixture, `novelty` and `birge`.
     #[must_use]
     pub fn write_learned(&self) -> Function {
         write_down(|writer| {
@@ -108,7 +109,7 @@ impl Correction<'_, f32, FILTER_INPUTS> {
     fn numbers<'t>(&self) -> Correction<'t, Expression<'t>, FILTER_INPUTS> {
         let [lower, upper] = [self.limits.lower, self.limits.upper].map(constant);
         Correction {
-            rows: Rows::new(&[], 0),
+            rows: InputRows::new(&[], 0),
             scales: &UNSCALED,
             direct: process(&self.direct),
             one_sided: [],
@@ -132,13 +133,13 @@ pub fn write_scaled() -> Function {
     })
 }
 
-/// The mixture of two voices, `mean_a`, `variance_a`, `mean_b` and `variance_b`: `mean` and `variance`.
+/// The mixture of two members, `mean_a`, `variance_a`, `mean_b` and `variance_b`: `mean` and `variance`.
 #[must_use]
 pub fn write_mixture() -> Function {
     write_down(|writer| {
-        let voices = [["mean_a", "variance_a"], ["mean_b", "variance_b"]]
+        let members = [["mean_a", "variance_a"], ["mean_b", "variance_b"]]
             .map(|[mean, variance]| Gaussian { mean: writer.input(mean), variance: writer.input(variance) });
-        give(writer, mixture(voices));
+        give(writer, mixture(members));
     })
 }
 
@@ -191,7 +192,7 @@ fn apart<'t>(
     (squares, [x, row])
 }
 
-fn give<'t>(writer: &mut Writer<'t>, told: Gaussian<Expression<'t>>) {
-    writer.give("mean", told.mean);
-    writer.give("variance", told.variance);
+fn give<'t>(writer: &mut Writer<'t>, corrected: Gaussian<Expression<'t>>) {
+    writer.give("mean", corrected.mean);
+    writer.give("variance", corrected.variance);
 }

@@ -88,5 +88,11 @@ impl<T: Copy> Fields<T> for Doubts<T> {
             see.number("least", &mut rest.least);
             see.number("rest_off", &mut rest.off);
         }
+        if let Some(turns) = &mut self.turns {
+            see.number("direction", &mut turns.direction);
+            see.maybe_one("farthest", &mut turns.farthest);
+            see.number("since_farthest_s", &mut turns.since_farthest_s);
+            see.number("since_turn_s", &mut turns.since_turn_s);
+        }
     }
 }

@@ -199,7 +199,8 @@ mod tests {
     use super::{Function, Name, write_down};
     use crate::correction::{FeatureScale, ReadingFeatures};
     use crate::live::{
-        DoubtParts, Doubts, Flag, Jumps, Repeats, RestBounds, RestFollower, RestSeen, SessionStart, Sieve, Unread,
+        DoubtParts, Doubts, Flag, Jumps, Repeats, RestBounds, RestFollower, RestSeen, SessionStart, Sieve, TurnSeen,
+        Unread,
     };
     use crate::record::tests::run;
     use crate::record::{Fields, See};
@@ -289,9 +290,10 @@ mod tests {
             per_reading: 0.3,
             start: 1e-4,
             most: unread.anywhere,
-            session: 1e-4,
+            unstated: 1e-4,
             unread,
             rest: Some(RestSeen { rested: 0.1, tolerance: 0.02, lasts_s: 2.0, sign: 1.0, end: 0.1 }),
+            turns: Some(TurnSeen { turn: 0.1, longest_s: 4.0 }),
         }
     }
 
@@ -341,6 +343,11 @@ mod tests {
             writer.keep(doubts);
             writer.give("open", open);
         });
+        let turns = write_down(|writer| {
+            let mut doubts = writer.state(Doubts::new(parts().to()));
+            doubts.watch_turns(writer.input("rho"));
+            writer.keep(doubts);
+        });
         let reads = write_down(|writer| {
             let mut doubts = writer.state(Doubts::new(parts().to()));
             doubts.read(writer.input("rho"), writer.input("nis"));
@@ -348,7 +355,8 @@ mod tests {
         });
         let widens = write_down(|writer| {
             let doubts = writer.state(Doubts::new(parts().to()));
-            let (variance, flags) = doubts.widened(writer.input("rate"), writer.input("variance"));
+            let stated = Gaussian { mean: writer.input("strain"), variance: writer.input("variance") };
+            let (variance, flags) = doubts.widened(stated, writer.input("rate"));
             writer.give("variance", variance);
             Flag::ALL.into_iter().for_each(|flag| writer.tell(flag.name(), flags.has(flag)));
         });
@@ -368,13 +376,21 @@ mod tests {
             } else {
                 doubts.pass(0.1);
                 let before = Seen::of(doubts);
+                doubts.watch_turns(rho);
+                let [after, _] = done(&turns, &before, &[("rho", rho)]);
+                assert_same(&after, &Seen::of(doubts), row);
+                let before = Seen::of(doubts);
                 doubts.read(rho, nis);
                 let [after, _] = done(&reads, &before, &[("rho", rho), ("nis", nis)]);
                 assert_same(&after, &Seen::of(doubts), row);
             }
             let rate = if row % 5 == 0 { 0.4 } else { -0.05 };
-            let (variance, flags) = doubts.widened(rate, stated.variance);
-            let [_, given] = done(&widens, &Seen::of(doubts), &[("rate", rate), ("variance", stated.variance)]);
+            let (variance, flags) = doubts.widened(stated, rate);
+            let [_, given] = done(
+                &widens,
+                &Seen::of(doubts),
+                &[("strain", stated.mean), ("rate", rate), ("variance", stated.variance)],
+            );
             assert_eq!(given["variance"], variance, "row {row}");
             for flag in Flag::ALL {
                 assert_eq!(given[flag.name()] == 1.0, flags.has(flag), "row {row}, {flag:?}");

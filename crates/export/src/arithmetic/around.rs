@@ -28,6 +28,9 @@ impl Around<'_> {
             [self.begin(), self.tell_rest(), self.run(), self.doubt_reading(), self.doubt_pause(), self.doubted()];
         let mut all: Vec<_> =
             of_readings.into_iter().chain(of_rest).chain(of_doubts).chain([self.has_begun(), self.refuse()]).collect();
+        if self.parts.live.doubt.turns.is_some() {
+            all.push(self.watch_turns());
+        }
         if let Some(correction) = self.parts.correction {
             all.extend([self.birge(), watch(&correction.features)]);
             all.extend(correction::functions(&OwnedLearned::new(
@@ -213,7 +216,7 @@ impl Around<'_> {
     fn tell_rest(&self) -> Printed {
         Printed::new("tell_rest", "R0 of today has been told.", &[], |writer| {
             let mut doubts = writer.state(self.doubts());
-            doubts.told_rest();
+            doubts.restart_rest_watch();
             writer.keep(doubts);
         })
     }
@@ -258,6 +261,14 @@ impl Around<'_> {
         )
     }
 
+    fn watch_turns(&self) -> Printed {
+        Printed::new("watch_turns", "Takes a reading that will be used.", &["float rho"], |writer| {
+            let mut doubts = writer.state(self.doubts());
+            doubts.watch_turns(writer.input("rho"));
+            writer.keep(doubts);
+        })
+    }
+
     fn doubt_reading(&self) -> Printed {
         Printed::new(
             "doubt_reading",
@@ -288,10 +299,11 @@ impl Around<'_> {
         Printed::new(
             "doubted",
             "The strain's variance with all doubts, and flags that say so.",
-            &["float rate", "float variance"],
+            &["float strain", "float rate", "float variance"],
             |writer| {
                 let doubts = writer.state(self.doubts());
-                let (variance, flags) = doubts.widened(writer.input("rate"), writer.input("variance"));
+                let stated = Gaussian { mean: writer.input("strain"), variance: writer.input("variance") };
+                let (variance, flags) = doubts.widened(stated, writer.input("rate"));
                 writer.give("widened", variance);
                 for (name, flag) in DOUBTS {
                     writer.tell(name, flags.has(flag));

@@ -28,13 +28,14 @@ pub struct DoubtConstants {
     /// Variances.
     start: Literal,
     most: Literal,
-    /// Variance of the strain from what a session leaves open of R0.
-    session: Literal,
+    /// Variance of the strain that the filter does not state.
+    unstated: Literal,
     /// 1 where readings grow from rest on, -1 where they fall, 0 where it is not known.
     sign: Literal,
     zero: Literal,
     unread: UnreadConstants,
     rest: Option<RestConstants>,
+    turns: Option<TurnConstants>,
 }
 
 /// Between which readings R₀ is calibration's.
@@ -64,6 +65,13 @@ struct RestConstants {
     end: Literal,
 }
 
+/// Constants of the turns of readings.
+#[derive(Debug, Serialize)]
+struct TurnConstants {
+    turn: Literal,
+    longest_s: Literal,
+}
+
 impl DoubtConstants {
     /// Converts those of a sensor; a strain below `zero` counts as zero.
     pub fn new(seen: &DoubtParts<f32>, zero: Literal) -> Self {
@@ -75,7 +83,7 @@ impl DoubtConstants {
             per_reading: Literal(seen.per_reading),
             start: Literal(seen.start),
             most: Literal(seen.most),
-            session: Literal(seen.session),
+            unstated: Literal(seen.unstated),
             sign: Literal(seen.rest.map_or(0.0, |rest| rest.sign)),
             zero,
             unread: UnreadConstants {
@@ -90,6 +98,9 @@ impl DoubtConstants {
                 lasts_s: Literal(rest.lasts_s),
                 end: Literal(rest.end),
             }),
+            turns: seen
+                .turns
+                .map(|turns| TurnConstants { turn: Literal(turns.turn), longest_s: Literal(turns.longest_s) }),
         }
     }
 }

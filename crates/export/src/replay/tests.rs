@@ -1,7 +1,7 @@
 use ohmstrain::{Filter, FilterBuilder, Influence, Sensor};
 use ohmstrain_ekf::live::SensorEstimator;
 use ohmstrain_ekf::{Gaussian, StepError};
-use ohmstrain_sensor::{EstimatorKind, SensorParams, Sessions};
+use ohmstrain_sensor::{EstimatorKind, SensorParams, Sessions, Unstated};
 
 use super::super::fixed_rate::longest_step_s;
 use super::{ChipFilter, FixedRate, Plan, Protections, StepNumbers, Task, TwinFilter, with_twin};
@@ -21,31 +21,34 @@ fn sign_split_sensor() -> Sensor {
     params.estimators = [(EstimatorKind::SignSplit, estimator)].into();
     params.correction.iter_mut().for_each(|correction| correction.corrects = EstimatorKind::SignSplit);
     params.sessions = Some(Sessions { rest_sd: 0.15, start_sd: 0.07 });
+    // The recording below turns every few seconds, and does not while readings are missing.
+    params.validity.longest_unturned_s = Some(2.5);
+    params.unstated = Unstated { filter_sd: 0.01, smoother_sd: 0.02 };
     Sensor::from_params(params).unwrap()
 }
 
 /// A row of a recording.
 #[derive(Clone, Copy)]
-struct Row {
+struct RecordedRow {
     time_s: f64,
     reading: Option<f64>,
 }
 
 /// A recording of the law's own readings, at times that jitter by milliseconds.
-fn rows(params: &SensorParams) -> Vec<Row> {
+fn rows(params: &SensorParams) -> Vec<RecordedRow> {
     let law = params.law.to_model::<2>().unwrap();
     let mut time_s = 0.0;
     let row = |k: u32| {
         time_s += (1e3 * (0.05 + 0.03 * (1.7 * f64::from(k)).sin())).round() * 1e-3;
         let strain = 0.5 * params.limits.span() * (1.0 - (0.9 * time_s).cos());
         let rho = law.gauge_value_and_slope(strain).0 + 1e-3 * (5.3 * f64::from(k)).sin();
-        Row { time_s, reading: Some(params.rest_reading * (1.0 + rho)) }
+        RecordedRow { time_s, reading: Some(params.rest_reading * (1.0 + rho)) }
     };
     (0..3000).map(row).collect()
 }
 
 /// Estimates of the twin in double precision, row by row.
-fn twin(sensor: &Sensor, kind: EstimatorKind, rows: &[Row], protections: Protections) -> Vec<Gaussian<f64>> {
+fn twin(sensor: &Sensor, kind: EstimatorKind, rows: &[RecordedRow], protections: Protections) -> Vec<Gaussian<f64>> {
     let params = sensor.params();
     let parts = ChipFilter::new(params, &Plan { kind: Some(kind), ..Plan::default() }).unwrap();
     of_computer(params, &parts, Replayed { rows, protections })
@@ -53,7 +56,7 @@ fn twin(sensor: &Sensor, kind: EstimatorKind, rows: &[Row], protections: Protect
 
 /// Runs a task with the twin in double precision, whose steps are those of a computer: lengths to a nanosecond, and pauses divided
 /// as where no table ends.
-fn of_computer<J: Task<f64>>(params: &SensorParams, parts: &ChipFilter, task: J) -> J::Said {
+fn of_computer<J: Task<f64>>(params: &SensorParams, parts: &ChipFilter, task: J) -> J::Output {
     let mut fixed = FixedRate::<2, 5>::new::<15>(params, parts, 0.05).unwrap();
     let longest_s = longest_step_s::<2, 5, 15>(&fixed.reference, &fixed.parts).unwrap();
     fixed.parts.live.longest_step_s = (longest_s * 1_073_741_824.0).floor() / 1_073_741_824.0;
@@ -62,12 +65,12 @@ fn of_computer<J: Task<f64>>(params: &SensorParams, parts: &ChipFilter, task: J)
 
 /// Rows as they are.
 struct Replayed<'a> {
-    rows: &'a [Row],
+    rows: &'a [RecordedRow],
     protections: Protections,
 }
 
 impl Task<f64> for Replayed<'_> {
-    type Said = Vec<Gaussian<f64>>;
+    type Output = Vec<Gaussian<f64>>;
 
     fn run<F, const N: usize, const L: usize>(
         self,
@@ -77,18 +80,18 @@ impl Task<f64> for Replayed<'_> {
         F: SensorEstimator<f64, N, L, Prepared = F> + StepNumbers<f64>,
     {
         let (mut live, mut last_s) = (live.protected_by(self.protections), None);
-        let said = |row: &Row| {
+        let strain = |row: &RecordedRow| {
             let dt_s = row.time_s - last_s.replace(row.time_s).unwrap_or(row.time_s);
             let reading = row.reading.map(|reading| live.relative(reading, 0.0));
-            live.step_after(dt_s, reading).map(|said| said.strain)
+            live.step_after(dt_s, reading).map(|row| row.strain)
         };
-        self.rows.iter().map(said).collect()
+        self.rows.iter().map(strain).collect()
     }
 }
 
 /// Estimates of the library's filter, row by row.
-fn library(filter: &mut Filter, rows: &[Row]) -> Vec<(f64, f64)> {
-    let row = |row: &Row| {
+fn library(filter: &mut Filter, rows: &[RecordedRow]) -> Vec<(f64, f64)> {
+    let row = |row: &RecordedRow| {
         let estimate = filter.step(row.time_s, row.reading).unwrap();
         (estimate.strain, estimate.strain_sd)
     };
@@ -103,24 +106,24 @@ fn a_twin_that_starts_again_at_zero_is_the_librarys_filter_that_starts_there() {
     let rested = another_day * params.measured_rest.unwrap();
     let mut rows = rows(params);
     let parts = ChipFilter::new(params, &Plan::default()).unwrap();
-    let said = of_computer(params, &parts, ElsewhereAfter { rows: &rows, another_day, rested });
+    let estimates = of_computer(params, &parts, ElsewhereAfter { rows: &rows, another_day, rested });
     let mut filter = sensor.filter().rest_resistance(rested).initial_strain(0.0).build().unwrap();
     rows.iter_mut().for_each(|row| row.reading = row.reading.map(|reading| another_day * reading));
-    for (k, (said, expected)) in said.into_iter().zip(library(&mut filter, &rows)).enumerate() {
-        let off = ((said.mean - expected.0) / expected.1).abs().max((said.sd() / expected.1 - 1.0).abs());
+    for (k, (estimate, expected)) in estimates.into_iter().zip(library(&mut filter, &rows)).enumerate() {
+        let off = ((estimate.mean - expected.0) / expected.1).abs().max((estimate.sd() / expected.1 - 1.0).abs());
         assert!(off < 1e-9, "row {k} is {off} off");
     }
 }
 
 /// A twin that has run for a while, and rests on another day.
 struct ElsewhereAfter<'a> {
-    rows: &'a [Row],
+    rows: &'a [RecordedRow],
     another_day: f64,
     rested: f64,
 }
 
 impl Task<f64> for ElsewhereAfter<'_> {
-    type Said = Vec<Gaussian<f64>>;
+    type Output = Vec<Gaussian<f64>>;
 
     fn run<F, const N: usize, const L: usize>(
         self,
@@ -134,12 +137,12 @@ impl Task<f64> for ElsewhereAfter<'_> {
         }
         live.rezero(self.rested)?;
         let mut last_s = None;
-        let said = |row: &Row| {
+        let strain = |row: &RecordedRow| {
             let dt_s = row.time_s - last_s.replace(row.time_s).unwrap_or(row.time_s);
             let reading = row.reading.map(|reading| live.relative(self.another_day * reading, 0.0));
-            live.step_after(dt_s, reading).map(|said| said.strain)
+            live.step_after(dt_s, reading).map(|row| row.strain)
         };
-        self.rows.iter().map(said).collect()
+        self.rows.iter().map(strain).collect()
     }
 }
 
@@ -164,10 +167,10 @@ fn the_twin_in_double_precision_is_the_librarys_filter() {
         }
         rows.iter_mut().for_each(|row| row.reading = row.reading.map(|reading| day * reading));
         rows[1200..1260].iter_mut().for_each(|row| row.reading = None);
-        let said = twin(&sensor, kind, &rows, Protections::ALL);
+        let estimates = twin(&sensor, kind, &rows, Protections::ALL);
         let expected = library(&mut sensor.filter().estimator(kind).build().unwrap(), &rows);
-        for (k, (said, expected)) in said.iter().zip(expected).enumerate() {
-            assert_eq!((said.mean, said.sd()), expected, "{}, {day}: row {k}", kind.name());
+        for (k, (estimate, expected)) in estimates.iter().zip(expected).enumerate() {
+            assert_eq!((estimate.mean, estimate.sd()), expected, "{}, {day}: row {k}", kind.name());
         }
     }
 }
@@ -184,7 +187,7 @@ const SWITCHES: [Switch; 5] = [
 ];
 
 /// An unplugging, a number that is stuck, spikes, a bad contact, and another day.
-fn faulty(mut rows: Vec<Row>) -> Vec<Row> {
+fn faulty(mut rows: Vec<RecordedRow>) -> Vec<RecordedRow> {
     for (k, row) in rows.iter_mut().enumerate() {
         row.reading = row.reading.map(|reading| match k {
             700..720 => 210_000.0,
@@ -206,12 +209,12 @@ fn what_is_turned_off_is_off_in_both() {
     let kind = EstimatorKind::Corrected;
     let protected = twin(&sensor, kind, &rows, Protections::ALL);
     for (protections, switch) in SWITCHES {
-        let said = twin(&sensor, kind, &rows, protections);
+        let estimates = twin(&sensor, kind, &rows, protections);
         let expected = library(&mut switch(sensor.filter(), sensor.params().rested()).build().unwrap(), &rows);
         let mut unlike = 0;
-        for (k, (said, expected)) in said.iter().zip(expected).enumerate() {
-            assert_eq!((said.mean, said.sd()), expected, "{protections:?}: row {k}");
-            let [with, without] = [protected[k], *said];
+        for (k, (estimate, expected)) in estimates.iter().zip(expected).enumerate() {
+            assert_eq!((estimate.mean, estimate.sd()), expected, "{protections:?}: row {k}");
+            let [with, without] = [protected[k], *estimate];
             let off = ((with.mean - without.mean) / without.sd()).abs().max((with.sd() / without.sd() - 1.0).abs());
             unlike += usize::from(off > 0.1);
         }

@@ -117,7 +117,7 @@ static const float SIMULATED_WEIGHT[SIMULATED_ROWS] = {<< correction.simulated.p
 static void correct(const summary *all, const readings *seen, float filtered, float filtered_variance, float *strain,
                     float *variance)
 {
-    float input[INPUTS], x[INPUTS], square[INPUTS], kernel[2][INDUCING], outside[2], said[2], mean[2], spread[2], novelty;
+    float input[INPUTS], x[INPUTS], square[INPUTS], kernel[2][INDUCING], outside[2], predicted[2], mean[2], spread[2], novelty;
     int i, k;
 
     input[0] = filtered;
@@ -133,29 +133,29 @@ static void correct(const summary *all, const readings *seen, float filtered, fl
         input[OUTPUTS + i] = seen->feature[i];
     }
     scale_all(input, INPUT_SCALE, INPUTS, x, square);
-    of_inputs(x, square, &outside[0], &outside[1], &said[0], &said[1]);
+    of_inputs(x, square, &outside[0], &outside[1], &predicted[0], &predicted[1]);
     for (k = 0; k < ROWS; k++) {
         float of_direct, of_residual;
         kernels(x, ROW[k], &of_direct, &of_residual);
-        said[0] += DIRECT.weight[k] * of_direct;
-        said[1] += RESIDUAL.weight[k] * of_residual;
+        predicted[0] += DIRECT.weight[k] * of_direct;
+        predicted[1] += RESIDUAL.weight[k] * of_residual;
         if (k < INDUCING) {
             kernel[0][k] = of_direct;
             kernel[1][k] = of_residual;
         }
     }
-    direct(said[0], explained_by(&DIRECT, kernel[0]), x[OUTPUTS], outside[0], &mean[0], &spread[0]);
-    residual(said[1], explained_by(&RESIDUAL, kernel[1]), x[0], outside[1], filtered, filtered_variance, &mean[1],
+    direct(predicted[0], explained_by(&DIRECT, kernel[0]), x[OUTPUTS], outside[0], &mean[0], &spread[0]);
+    residual(predicted[1], explained_by(&RESIDUAL, kernel[1]), x[0], outside[1], filtered, filtered_variance, &mean[1],
              &spread[1], &novelty);
     mix(mean[0], spread[0], mean[1], spread[1], &mean[0], &spread[0]);
     spread[0] = learned(spread[0], novelty, birge_of(seen));
 {% if correction.simulated %}
     scale_all(seen->feature, SIMULATED_SCALE, FEATURES, x, square);
-    said[1] = << correction.simulated.process.mean >>f;
+    predicted[1] = << correction.simulated.process.mean >>f;
     for (k = 0; k < SIMULATED_ROWS; k++) {
-        said[1] += SIMULATED_WEIGHT[k] * simulated_kernel(x, SIMULATED_ROW[k]);
+        predicted[1] += SIMULATED_WEIGHT[k] * simulated_kernel(x, SIMULATED_ROW[k]);
     }
-    simulated(said[1], x[0], simulated_distance(square), &mean[1], &spread[1]);
+    simulated(predicted[1], x[0], simulated_distance(square), &mean[1], &spread[1]);
     mix(mean[0], spread[0], mean[1], spread[1], strain, variance);
 {% else %}
     *strain = mean[0];

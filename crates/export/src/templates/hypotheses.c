@@ -263,7 +263,7 @@ static int add_child(children *all, const hypothesis *parent, int phase, float p
         if (!(mass > LEAST_MASS)) {
             return 1;
         }
-        /* After a hold the chain has said how likely this direction is; none of it goes to the other. */
+        /* After a hold the chain gives the probability of this direction; none of it goes to the other. */
         if (!(rests && mass > 0.5f)) {
             prior *= mass;
         }

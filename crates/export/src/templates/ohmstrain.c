@@ -63,6 +63,14 @@ enum { DOUBTS = 0 };
 #else
 enum { DOUBTS = 1 };
 #endif
+{% if doubt.turns %}
+/* The flash of an Uno has no room for it. */
+#ifdef __AVR__
+enum { TURNS = 0 };
+#else
+enum { TURNS = 1 };
+#endif
+{% endif %}
 
 #ifdef __AVR__
 /* Its C library has none. What expf rounds off cancels in the quotient (Kahan). */
@@ -641,12 +649,18 @@ static ohmstrain_status step(ohmstrain_state *state, float dt_s, const float *rh
         refuse(&seen);
     }
     if (believed) {
-        doubt_reading(&seen, seen.follows ? of_session(&seen, *believed) : *believed, of_step.nis);
+        const float of_calibration = seen.follows ? of_session(&seen, *believed) : *believed;
+{% if doubt.turns %}
+        if (TURNS) {
+            watch_turns(&seen, of_calibration);
+        }
+{% endif %}
+        doubt_reading(&seen, of_calibration, of_step.nis);
     } else {
         variance = doubt_pause(&seen, strain, variance);
     }
     if (DOUBTS) {
-        flags |= doubted(&seen, all.mean[1], variance, &state->variance);
+        flags |= doubted(&seen, strain, all.mean[1], variance, &state->variance);
     }
     seen.flags = flags;
     state->readings = seen;

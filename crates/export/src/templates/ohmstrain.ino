@@ -28,27 +28,31 @@ uint32_t last_us;   // when the last step was taken
 uint32_t tried_us;  // when one was tried last
 
 // Level at the pin, in the unit of SUPPLY.
-float level() {
+uint16_t level() {
 #if defined(ARDUINO_ARCH_ESP32)
-  return static_cast<float>(analogReadMilliVolts(PIN));
+  return analogReadMilliVolts(PIN);
 #else
-  return static_cast<float>(analogRead(PIN));
+  return analogRead(PIN);
 #endif
 }
 
-// Resistance of the sensor, ohm; infinite if it is not connected: the filter goes on without.
-float sensor_ohm() {
-  const float at_pin = level();
-  return R_SERIES * at_pin / (SUPPLY - at_pin);
+// Resistance of the sensor, ohm, from the sum of as many levels; infinite if it is not connected: the filter goes on without.
+float ohm_of(uint32_t sum, uint8_t levels) {
+  const float at_pin = static_cast<float>(sum);
+  return R_SERIES * at_pin / (SUPPLY * levels - at_pin);
 }
 
-// The same of a sensor that rests: a mean.
+float sensor_ohm() {
+  return ohm_of(level(), 1);
+}
+
+// The same of a sensor that rests: from the mean of the levels.
 float rested_ohm() {
-  float sum = 0.0f;
-  for (int i = 0; i < 64; i++) {
-    sum += sensor_ohm();
+  uint32_t sum = 0;
+  for (uint8_t i = 0; i < 64; i++) {
+    sum += level();
   }
-  return sum / 64.0f;
+  return ohm_of(sum, 64);
 }
 
 {% if reading_unit == "ohm" %}
@@ -80,11 +84,22 @@ ohmstrain_status rests_now() {
 }
 {% endif %}
 
+// Prints a name and a strain.
+void show(const char *name, float strain) {
+  Serial.print(name);
+  Serial.print(strain, 5);
+}
+
+// Prints a name and a number, and ends the line.
+void tell(const char *name, int number) {
+  Serial.print(name);
+  Serial.println(number);
+}
+
 // Stops with a message: a filter that is not there must not look like one.
 void fail(const char *what, int status) {
   for (;;) {
-    Serial.print(what);
-    Serial.println(status);
+    tell(what, status);
     delay(1000);
   }
 }
@@ -101,8 +116,7 @@ void setup() {
 {% else %}
   // The calibration is about ratios: the resistance at rest is measured now, with the sensor relaxed, or as soon as it is connected.
   for (ohmstrain_status rested = rests_now(); rested != OHMSTRAIN_OK; rested = rests_now()) {
-    Serial.print("ohmstrain_rezero: ");
-    Serial.println(rested);
+    tell("ohmstrain_rezero: ", rested);
     delay(1000);
   }
 {% endif %}
@@ -128,8 +142,7 @@ void loop() {
   const ohmstrain_status status = ohmstrain_step_after(&state, since_s, reading, 0.0f, nullptr);
   if (status != OHMSTRAIN_OK) {
     // Everything is as it was before: the next step takes the time of this one, too.
-    Serial.print("ohmstrain_step_after: ");
-    Serial.println(status);
+    tell("ohmstrain_step_after: ", status);
     return;
   }
   last_us += since_us;
@@ -146,12 +159,8 @@ void loop() {
   Serial.print(reading, 4);
   Serial.print(",");
 #endif
-  Serial.print("strain:");
-  Serial.print(estimate.strain, 5);
-  Serial.print(",lo:");
-  Serial.print(estimate.lo, 5);
-  Serial.print(",hi:");
-  Serial.print(estimate.hi, 5);
-  Serial.print(",flags:");
-  Serial.println(estimate.flags);
+  show("strain:", estimate.strain);
+  show(",lo:", estimate.lo);
+  show(",hi:", estimate.hi);
+  tell(",flags:", estimate.flags);
 }

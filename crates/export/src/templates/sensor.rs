@@ -6,10 +6,10 @@
 #![allow(dead_code, clippy::excessive_precision, clippy::unreadable_literal, reason = "generated")]
 
 {% if correction %}
-use ohmstrain_ekf::correction::{Correction, FILTER_INPUTS, FeatureScale, InputScale, Process{% if correction.quadratics %}, Quadratic{% endif %}, RowBlock, Rows{% if correction.simulated %}, Simulated{% endif %}, Triangle};
-use ohmstrain_ekf::live::{DoubtParts, Learned, LiveFilter, LiveParts, RestBounds, {% if doubt.rest %}RestSeen, {% endif %}{% if follow.start is not none %}SessionStart, {% endif %}Sieve, Unread};
+use ohmstrain_ekf::correction::{Correction, FILTER_INPUTS, FeatureScale, InputScale, Process{% if correction.quadratics %}, Quadratic{% endif %}, RowBlock, InputRows{% if correction.simulated %}, Simulated{% endif %}, Triangle};
+use ohmstrain_ekf::live::{DoubtParts, Learned, LiveFilter, LiveParts, RestBounds, {% if doubt.rest %}RestSeen, {% endif %}{% if follow.start is not none %}SessionStart, {% endif %}Sieve, {% if doubt.turns %}TurnSeen, {% endif %}Unread};
 {% else %}
-use ohmstrain_ekf::live::{DoubtParts, Learned, LiveFilter, LiveParts, RestBounds, {% if doubt.rest %}RestSeen, {% endif %}{% if follow.start is not none %}SessionStart, {% endif %}Sieve, Unread};
+use ohmstrain_ekf::live::{DoubtParts, Learned, LiveFilter, LiveParts, RestBounds, {% if doubt.rest %}RestSeen, {% endif %}{% if follow.start is not none %}SessionStart, {% endif %}Sieve, {% if doubt.turns %}TurnSeen, {% endif %}Unread};
 {% endif %}
 {% if splits %}
 use ohmstrain_ekf::{Compact, {% if rests %}Dwell, {% endif %}Evidence, SignSplit, SparseEkf, StepError};
@@ -130,7 +130,7 @@ pub const DOUBT: DoubtParts<f32> = DoubtParts {
     per_reading: << doubt.per_reading >>,
     start: << doubt.start >>,
     most: << doubt.most >>,
-    session: << doubt.session >>,
+    unstated: << doubt.unstated >>,
     unread: Unread {
         rate_time_s: << doubt.unread.rate_time_s >>,
         path_variance: << doubt.unread.path_variance >>,
@@ -148,6 +148,7 @@ pub const DOUBT: DoubtParts<f32> = DoubtParts {
 {% else %}
     rest: None,
 {% endif %}
+    turns: {% if doubt.turns %}Some(TurnSeen { turn: << doubt.turns.turn >>, longest_s: << doubt.turns.longest_s >> }){% else %}None{% endif %},
 };
 
 /// Between which readings R₀ is calibration's.
@@ -236,7 +237,7 @@ pub const LEARNED: Learned<'static, f32> = Learned {
 
 /// Correction that was learned in calibration.
 pub const CORRECTION: Correction<'static, f32, FILTER_INPUTS> = Correction {
-    rows: Rows::new(&ROWS, << correction.rows.count >>),
+    rows: InputRows::new(&ROWS, << correction.rows.count >>),
     scales: &SCALES,
     one_sided: [],
 {% for p in correction.processes %}
@@ -254,7 +255,7 @@ pub const CORRECTION: Correction<'static, f32, FILTER_INPUTS> = Correction {
 {% if correction.simulated %}
 {% set p = correction.simulated.process %}
     simulated: Some(Simulated {
-        rows: Rows::new(&SIMULATED_ROWS, << correction.simulated.rows.count >>),
+        rows: InputRows::new(&SIMULATED_ROWS, << correction.simulated.rows.count >>),
         scales: &SIMULATED_SCALES,
         process: Process {
             relevance: [<< p.relevance|join(", ") >>],

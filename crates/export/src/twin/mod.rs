@@ -116,13 +116,16 @@ pub type TwinFilter<'a, T, F, const N: usize, const L: usize> = LiveFilter<T, Tw
 /// A task for a sensor's twin.
 pub trait Task<T: Real> {
     /// Its result.
-    type Said;
+    type Output;
 
     /// Runs the task.
     ///
     /// # Errors
     /// If the filter refuses a step.
-    fn run<F, const N: usize, const L: usize>(self, live: TwinFilter<'_, T, F, N, L>) -> Result<Self::Said, StepError>
+    fn run<F, const N: usize, const L: usize>(
+        self,
+        live: TwinFilter<'_, T, F, N, L>,
+    ) -> Result<Self::Output, StepError>
     where
         F: SensorEstimator<T, N, L, Prepared = F> + StepNumbers<T>;
 }
@@ -136,11 +139,11 @@ pub fn with_twin<T: Real, const B: usize, const N: usize, const L: usize, J: Tas
     model: SwitchedModel<T, B, N>,
     numbers: Numbers<'_, T>,
     task: J,
-) -> Result<J::Said, ExportError> {
+) -> Result<J::Output, ExportError> {
     let parts = &sensor.parts;
     let kernel = SparseEkf::<T, Compact, B, N>::new(model, number(parts.live.dt_s)).map_err(refused)?;
     let of = Of { sensor, numbers, task };
-    let said = match (parts.kind, parts.phases) {
+    let output = match (parts.kind, parts.phases) {
         (EstimatorKind::SignSplit, Some(phases)) => {
             let (dwell, evidence) = filter_parts(&phases, parts.limits_in()).map_err(refused)?;
             let hold = phases.rests().then_some(dwell);
@@ -152,7 +155,7 @@ pub fn with_twin<T: Real, const B: usize, const N: usize, const L: usize, J: Tas
         }
         _ => of.run::<_, N, L>(kernel),
     };
-    said.map_err(refused)
+    output.map_err(refused)
 }
 
 /// A task, and the sensor that it is done with.
@@ -163,7 +166,7 @@ struct Of<'a, 'b, T, J, const B: usize, const S: usize> {
 }
 
 impl<T: Real, J: Task<T>, const B: usize, const S: usize> Of<'_, '_, T, J, B, S> {
-    fn run<F, const N: usize, const L: usize>(self, filter: F) -> Result<J::Said, StepError>
+    fn run<F, const N: usize, const L: usize>(self, filter: F) -> Result<J::Output, StepError>
     where
         F: SensorEstimator<T, N, L, Prepared = F> + StepNumbers<T>,
     {

@@ -1,6 +1,6 @@
 //! Summary of a calibration, in words.
 
-use ohmstrain_sensor::{Findings, Limit, Quantity, Scores, Seen, SensorParams, TestedSummary};
+use ohmstrain_sensor::{Findings, Limit, Quantity, RecordingSummary, Scores, SensorParams, TestedSummary};
 use serde::Serialize;
 
 use super::number::{fixed, shown, significant};
@@ -99,6 +99,13 @@ impl Closing<'_> {
         is_better(&self.known())
     }
 
+    /// Tells by how much intervals are wider than the estimator's for errors on rows that it was not fitted to.
+    fn widened(&self) -> Option<String> {
+        let sd = self.params.unstated.filter_sd;
+        let share = percent(100.0 * sd / self.params.limits.span());
+        (sd > 0.0).then(|| format!("intervals are widened by a deviation of {share} for it"))
+    }
+
     fn known(&self) -> Vec<Known> {
         let left_out = self.findings.map(|found| Known::new(&found.filter, Some(&found.static_cubic)));
         left_out.into_iter().chain(self.tested.map(Known::from)).collect()
@@ -114,14 +121,15 @@ impl Closing<'_> {
     #[must_use]
     pub fn facts(&self) -> Vec<(&'static str, String)> {
         let tested = self.tested.map(|tested| ("Tested", error_in_test(tested)));
-        let Some(found) = self.findings else { return tested.into_iter().collect() };
+        let widened = self.widened().map(|widened| ("Widened", widened));
+        let Some(found) = self.findings else { return tested.into_iter().chain(widened).collect() };
         let next = if found.advice.is_empty() { advice(&found.advice, self.more) } else { found.advice.join("; ") };
         let facts = [
             ("Seen", seen(&found.seen, self.params.quantity)),
             ("Limited by", limited_by_in_full(found)),
             ("Record next", next),
         ];
-        [("Left out", error_and_coverage(found))].into_iter().chain(tested).chain(facts).collect()
+        [("Left out", error_and_coverage(found))].into_iter().chain(tested).chain(widened).chain(facts).collect()
     }
 
     /// Returns the lines that a program prints at the end: names and sentences, seven at most.
@@ -139,6 +147,10 @@ impl Closing<'_> {
             Some(found) => ("Left out", error_and_coverage(found)),
         });
         lines.extend(self.tested.map(|tested| ("Tested", error_in_test(tested))));
+        if let (Some(widened), Some((_, measured))) = (self.widened(), lines.last_mut()) {
+            measured.push_str("; ");
+            measured.push_str(&widened);
+        }
         if let Some(found) = self.findings {
             lines.push(("Seen", seen(&found.seen, self.params.quantity)));
             lines.push(("Limited by", limited_by(found)));
@@ -181,7 +193,7 @@ fn error_in_test(tested: &Tested) -> String {
 }
 
 /// Range, gaps in it, speeds and holds.
-fn seen(seen: &Seen, quantity: Quantity) -> String {
+fn seen(seen: &RecordingSummary, quantity: Quantity) -> String {
     let (scale, unit) = shown(quantity);
     let number = |x: f64| significant(scale * x, 3).replace('−', "-");
     let (low, span) = (seen.range.lower, seen.range.span());
@@ -255,7 +267,7 @@ mod tests {
     fn one_speed_is_one_number() {
         let with = |quartile_speeds, fastest_rate| {
             let range = RangeParams { lower: 0.0, upper: 0.4 };
-            let seen = Seen {
+            let seen = RecordingSummary {
                 range,
                 tenths: [0.1; 10],
                 quartile_speeds,

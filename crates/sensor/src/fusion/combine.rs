@@ -1,41 +1,41 @@
 use nalgebra::{DMatrix, DVector};
 
-/// Mean and standard deviation of one voice.
+/// Mean and standard deviation of one member.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Voice {
+pub struct Member {
     /// Strain.
     pub strain: f64,
     /// Its standard deviation.
     pub sd: f64,
 }
 
-impl Voice {
-    /// A voice that says nothing.
+impl Member {
+    /// A member that says nothing.
     pub const UNKNOWN: Self = Self { strain: f64::NAN, sd: f64::NAN };
 }
 
-/// The best linear unbiased estimate from voices whose errors are correlated, with no weight below zero: a voice with a negative weight
+/// The best linear unbiased estimate from members whose errors are correlated, with no weight below zero: a member with a negative weight
 /// would be believed to be wrong.
 ///
-/// `covariance(i, j)` is that of the errors of voices i and j in units of their deviations. `None` if there is no voice, or the numbers allow no estimate.
+/// `covariance(i, j)` is that of the errors of members i and j in units of their deviations. `None` if there is no member, or the numbers allow no estimate.
 ///
 /// Source: J. M. Bates, C. W. J. Granger, The combination of forecasts, *Operational Research Quarterly* 20 (1969) 451–468.
 #[must_use]
-pub fn combine(voices: &[Voice], covariance: impl Fn(usize, usize) -> f64) -> Option<Voice> {
+pub fn combine(members: &[Member], covariance: impl Fn(usize, usize) -> f64) -> Option<Member> {
     let mut used: Vec<usize> =
-        (0..voices.len()).filter(|&v| voices[v].strain.is_finite() && voices[v].sd > 0.0).collect();
+        (0..members.len()).filter(|&v| members[v].strain.is_finite() && members[v].sd > 0.0).collect();
     while !used.is_empty() {
         let n = used.len();
         let between = |i: usize, j: usize| {
             let (a, b) = (used[i], used[j]);
-            voices[a].sd * voices[b].sd * covariance(a, b)
+            members[a].sd * members[b].sd * covariance(a, b)
         };
         let factor = DMatrix::from_fn(n, n, between).cholesky()?;
         let weights = factor.solve(&DVector::from_element(n, 1.0));
         let sum = weights.sum();
         if weights.iter().all(|weight| *weight >= 0.0) {
-            let strain = weights.iter().zip(&used).map(|(weight, v)| weight * voices[*v].strain).sum::<f64>() / sum;
-            return Some(Voice { strain, sd: (1.0 / sum).sqrt() });
+            let strain = weights.iter().zip(&used).map(|(weight, v)| weight * members[*v].strain).sum::<f64>() / sum;
+            return Some(Member { strain, sd: (1.0 / sum).sqrt() });
         }
         used = used.iter().zip(weights.iter()).filter(|(_, weight)| **weight >= 0.0).map(|(v, _)| *v).collect();
     }
@@ -44,24 +44,24 @@ pub fn combine(voices: &[Voice], covariance: impl Fn(usize, usize) -> f64) -> Op
 
 #[cfg(test)]
 mod tests {
-    use super::{Voice, combine};
+    use super::{Member, combine};
 
     /// Two errors of standard deviations a and b and correlation r: the weight of the first is (b² − r a b) / (a² + b² − 2 r a b).
     #[test]
     fn two_voices_are_weighted_as_bates_and_granger_do() {
         let (a, b, r) = (1.0, 2.0, 0.3);
-        let voices = [Voice { strain: 10.0, sd: a }, Voice { strain: 20.0, sd: b }];
-        let fused = combine(&voices, |i, j| if i == j { 1.0 } else { r }).unwrap();
+        let members = [Member { strain: 10.0, sd: a }, Member { strain: 20.0, sd: b }];
+        let fused = combine(&members, |i, j| if i == j { 1.0 } else { r }).unwrap();
         let all = a * a + b * b - 2.0 * r * a * b;
         let weight = (b * b - r * a * b) / all;
         assert!((fused.strain - (10.0 * weight + 20.0 * (1.0 - weight))).abs() < 1e-12);
         assert!((fused.sd.powi(2) - a * a * b * b * (1.0 - r * r) / all).abs() < 1e-12);
     }
 
-    /// The second voice's weight would be negative where r is above a/b.
+    /// The second member's weight would be negative where r is above a/b.
     #[test]
     fn a_voice_that_only_repeats_a_better_one_has_no_weight() {
-        let voices = [Voice { strain: 10.0, sd: 1.0 }, Voice { strain: 20.0, sd: 2.0 }];
-        assert_eq!(combine(&voices, |i, j| if i == j { 1.0 } else { 0.8 }).unwrap(), voices[0]);
+        let members = [Member { strain: 10.0, sd: 1.0 }, Member { strain: 20.0, sd: 2.0 }];
+        assert_eq!(combine(&members, |i, j| if i == j { 1.0 } else { 0.8 }).unwrap(), members[0]);
     }
 }

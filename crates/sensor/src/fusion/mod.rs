@@ -2,7 +2,7 @@
 //! their errors vary together in parts that calibration left out.
 //!
 //! Readings of one strain lie near those of the calibration. A row that does not is looked at without each channel in turn: where that
-//! explains it, the channel is faulty and left out; where nothing does, the body moves as it did not in calibration, and no voice is
+//! explains it, the channel is faulty and left out; where nothing does, the body moves as it did not in calibration, and no member is
 //! worth what it says.
 
 mod combine;
@@ -14,11 +14,11 @@ mod regression;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-pub use combine::{Voice, combine};
+pub use combine::{Member, combine};
 pub use low_passes::LowPasses;
 pub use novelty::distance;
 pub use params::{FUSION_FORMAT, FusionParams, FusionRow, MOST_CHANNELS, RegressionParams};
-pub use regression::{PRIOR_SD, Regression, Seen};
+pub use regression::{FusionReadings, PRIOR_SD, Regression};
 
 /// Multiple of [`FusionParams::novelty`] beyond which a row is unlike the calibration.
 pub const UNLIKE: f64 = 1.5;
@@ -33,7 +33,7 @@ pub struct ChannelState {
     /// ln R/R₀; NaN for a missing or implausible reading.
     pub ln_r: f64,
     /// Strain of the channel's own filter.
-    pub own: Voice,
+    pub own: Member,
 }
 
 /// Fused estimate.
@@ -85,16 +85,16 @@ impl Fusion {
         self.low_passes.step(time_s, &ln_r);
         let read: Vec<usize> = (0..ln_r.len()).filter(|&channel| ln_r[channel].is_finite()).collect();
         let regressions = self.regressions(&read);
-        let seen = Seen { ln_r: &ln_r, low_passed: self.low_passes.states() };
-        let mut voices: Vec<Voice> = channels.iter().map(|channel| channel.own).collect();
+        let seen = FusionReadings { ln_r: &ln_r, low_passed: self.low_passes.states() };
+        let mut members: Vec<Member> = channels.iter().map(|channel| channel.own).collect();
         if let Some(faulty) = faulty {
-            voices[faulty] = Voice::UNKNOWN;
+            members[faulty] = Member::UNKNOWN;
         }
-        let told = |one: &Option<Regression>| one.as_ref().map_or(Voice::UNKNOWN, |one| one.strain(seen));
-        voices.extend(regressions.iter().map(told));
+        let prediction = |one: &Option<Regression>| one.as_ref().map_or(Member::UNKNOWN, |one| one.strain(seen));
+        members.extend(regressions.iter().map(prediction));
         let limits = params.limits;
-        let nothing = Voice { strain: 0.5 * (limits.lower + limits.upper), sd: limits.span() };
-        let fused = params.fused(&voices, novelty).unwrap_or(nothing);
+        let nothing = Member { strain: 0.5 * (limits.lower + limits.upper), sd: limits.span() };
+        let fused = params.fused(&members, novelty).unwrap_or(nothing);
         Fused { strain: fused.strain.clamp(limits.lower, limits.upper), sd: fused.sd, faulty, is_unlike: novelty > 0.0 }
     }
 
@@ -144,14 +144,14 @@ impl FusionParams {
         explains.map_or_else(|| (None, (all - UNLIKE).min(1.0)), |(channel, _)| (Some(channel), 0.0))
     }
 
-    /// The voices together, as far as readings that are unlike the calibration's (0 to 1) let them count: each voice, and all of them
+    /// The members together, as far as readings that are unlike the calibration's (0 to 1) let them count: each member, and all of them
     /// together, may then be off by the prior's standard deviation.
     #[must_use]
-    pub fn fused(&self, voices: &[Voice], novelty: f64) -> Option<Voice> {
+    pub fn fused(&self, members: &[Member], novelty: f64) -> Option<Member> {
         let prior = novelty * (PRIOR_SD * self.limits.span()).powi(2);
-        let doubted = |voice: &Voice| Voice { sd: (voice.sd * voice.sd + prior).sqrt(), ..*voice };
-        let voices: Vec<Voice> = voices.iter().map(doubted).collect();
-        let fused = combine(&voices, |i, j| self.error_covariance[i][j])?;
-        Some(Voice { strain: fused.strain, sd: self.sd_scale * (fused.sd * fused.sd + prior).sqrt() })
+        let doubted = |member: &Member| Member { sd: (member.sd * member.sd + prior).sqrt(), ..*member };
+        let members: Vec<Member> = members.iter().map(doubted).collect();
+        let fused = combine(&members, |i, j| self.error_covariance[i][j])?;
+        Some(Member { strain: fused.strain, sd: self.sd_scale * (fused.sd * fused.sd + prior).sqrt() })
     }
 }

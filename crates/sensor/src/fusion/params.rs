@@ -15,7 +15,7 @@ const NOISE: Allowed = Allowed { least: 1e-4, most: 1.0 };
 
 /// Fusion of several channels that see one strain: the content of a fusion file.
 ///
-/// Its voices are the channels' filters, in order, and then the regressions of the strain on all readings.
+/// Its members are the channels' filters, in order, and then the regressions of the strain on all readings.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FusionParams {
@@ -33,7 +33,7 @@ pub struct FusionParams {
     pub novelty: f64,
     /// Typical difference of ln R of each channel between rows in which the others agree.
     pub channel_sd: Vec<f64>,
-    /// Covariances of the voices' errors in blocks left out, in units of their deviations, correlations shrunken; no variance is below one.
+    /// Covariances of the members' errors in blocks left out, in units of their deviations, correlations shrunken; no variance is below one.
     pub error_covariance: Vec<Vec<f64>>,
     /// Time constants of the low-passes of ln R, s.
     pub low_pass_s: Vec<f64>,
@@ -91,11 +91,11 @@ impl FusionParams {
             return Err(root.wrong("rows", "at least one", 0));
         }
         root.numbers("low_pass_s", &self.low_pass_s, POSITIVE)?;
-        let voices = self.channels() + self.regressions.len();
-        root.length("error_covariance", voices, self.error_covariance.len())?;
-        for of_voice in &self.error_covariance {
-            root.length("error_covariance", voices, of_voice.len())?;
-            root.numbers("error_covariance", of_voice, COVARIANCE)?;
+        let members = self.channels() + self.regressions.len();
+        root.length("error_covariance", members, self.error_covariance.len())?;
+        for of_member in &self.error_covariance {
+            root.length("error_covariance", members, of_member.len())?;
+            root.numbers("error_covariance", of_member, COVARIANCE)?;
         }
         for (index, regression) in self.regressions.iter().enumerate() {
             regression.validate(&root.entry("regressions", index), self.low_pass_s.len())?;

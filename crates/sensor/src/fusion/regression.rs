@@ -1,6 +1,6 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use super::combine::Voice;
+use super::combine::Member;
 use super::params::{FusionRow, RegressionParams};
 
 /// Prior standard deviation of the strain, as a share of its range: that of any strain within it.
@@ -8,14 +8,14 @@ pub const PRIOR_SD: f64 = 0.4;
 
 /// ln R/R₀ of all channels at one time, and its low-passes.
 #[derive(Clone, Copy)]
-pub struct Seen<'a> {
+pub struct FusionReadings<'a> {
     /// ln R/R₀ of each channel; NaN where it is not used.
     pub ln_r: &'a [f64],
     /// Low-passes of it, for each time constant.
     pub low_passed: &'a [Vec<f64>],
 }
 
-impl<'a> From<&'a FusionRow> for Seen<'a> {
+impl<'a> From<&'a FusionRow> for FusionReadings<'a> {
     fn from(row: &'a FusionRow) -> Self {
         Self { ln_r: &row.ln_r, low_passed: &row.low_passed }
     }
@@ -44,7 +44,7 @@ impl Regression {
     /// Conditions a process that sees `channels` on rows; `None` if there are no rows or no channels, or if the numbers allow none.
     #[must_use]
     pub fn new(rows: &[&FusionRow], params: &RegressionParams, channels: &[usize], span: f64) -> Option<Self> {
-        let of_row = |row: &&FusionRow| raw_inputs(params, channels, Seen::from(*row)).collect::<Vec<f64>>();
+        let of_row = |row: &&FusionRow| raw_inputs(params, channels, FusionReadings::from(*row)).collect::<Vec<f64>>();
         if channels.is_empty() {
             return None;
         }
@@ -73,7 +73,7 @@ impl Regression {
 
     /// The strain, its noise included.
     #[must_use]
-    pub fn strain(&self, seen: Seen) -> Voice {
+    pub fn strain(&self, seen: FusionReadings) -> Member {
         let input = scaled(raw_inputs(&self.params, &self.channels, seen), &self.scale);
         let of_row = |row: &Vec<f64>| kernel(&input, row, self.params.length);
         let mut covariance = DVector::from_iterator(self.inputs.len(), self.inputs.iter().map(of_row));
@@ -82,7 +82,7 @@ impl Regression {
         let prior = kernel(&input, &input, self.params.length);
         // Rounding may take more from the variance than there is.
         let variance = (prior - covariance.norm_squared()).max(0.0) + self.params.noise * self.params.noise;
-        Voice { strain: self.mean_strain + mean * self.span, sd: variance.sqrt() * self.span }
+        Member { strain: self.mean_strain + mean * self.span, sd: variance.sqrt() * self.span }
     }
 }
 
@@ -90,7 +90,7 @@ impl Regression {
 fn raw_inputs<'a>(
     params: &'a RegressionParams,
     channels: &'a [usize],
-    seen: Seen<'a>,
+    seen: FusionReadings<'a>,
 ) -> impl Iterator<Item = f64> + 'a {
     let above = move |low_passed: &'a [f64]| channels.iter().map(move |&c| seen.ln_r[c] - low_passed[c]);
     let readings = channels.iter().map(move |&c| seen.ln_r[c]);
@@ -122,7 +122,7 @@ fn kernel(a: &[f64], b: &[f64], length: f64) -> f64 {
 mod tests {
     use nalgebra::{DMatrix, DVector};
 
-    use super::{FusionRow, PRIOR_SD, Regression, RegressionParams, Seen};
+    use super::{FusionReadings, FusionRow, PRIOR_SD, Regression, RegressionParams};
 
     fn row(strain: f64, first: f64, second: f64) -> FusionRow {
         FusionRow { strain, ln_r: vec![first, second], low_passed: vec![vec![0.5 * first, 0.9 * second]] }
@@ -160,7 +160,7 @@ mod tests {
         let k = DVector::from_iterator(5, x.iter().map(|row| kernel(row, &at)));
         let expected = mean_strain + 0.3 * (k.transpose() * &inverse * &targets)[0];
         let variance = kernel(&at, &at) - (k.transpose() * &inverse * &k)[0] + 0.0025;
-        let found = regression.strain(Seen::from(&new));
+        let found = regression.strain(FusionReadings::from(&new));
         // The inverse of a matrix whose condition is below 1e4 loses four digits of sixteen.
         assert!((found.strain - expected).abs() < 1e-11, "{found:?} {expected}");
         assert!((found.sd - 0.3 * variance.sqrt()).abs() < 1e-11, "{found:?}");
@@ -174,8 +174,8 @@ mod tests {
         let all: Vec<&FusionRow> = rows.iter().collect();
         let params = RegressionParams { low_passes: vec![0], length: 1.0, noise: 0.01 };
         let regression = Regression::new(&all, &params, &[0, 1], 0.3).unwrap();
-        let near = regression.strain(Seen::from(&rows[7]));
-        let far = regression.strain(Seen::from(&row(0.0, 0.5, 30.0)));
+        let near = regression.strain(FusionReadings::from(&rows[7]));
+        let far = regression.strain(FusionReadings::from(&row(0.0, 0.5, 30.0)));
         assert!(near.sd < 0.05 * 0.3 && far.sd > PRIOR_SD * 0.3, "{near:?} {far:?}");
     }
 

@@ -25,7 +25,7 @@ pub struct Findings {
     /// Contributions to the error.
     pub budget: ErrorBudget,
     /// Content of the recordings.
-    pub seen: Seen,
+    pub seen: RecordingSummary,
     /// Advice on the next recording, most important first; empty if nothing stands out.
     pub advice: Vec<String>,
 }
@@ -33,7 +33,7 @@ pub struct Findings {
 /// Content of the recordings of a calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Seen {
+pub struct RecordingSummary {
     /// Range of the reference.
     pub range: RangeParams,
     /// Share of the rows, 0 to 1, in each tenth of that range, lowest first.

@@ -1,6 +1,6 @@
 //! Constants of a filter that runs for days, from the calibration of its sensor.
 
-use ohmstrain_ekf::live::{DOUBT, DoubtParts, RestBounds, RestSeen, SessionStart, Sieve, Unread};
+use ohmstrain_ekf::live::{DOUBT, DoubtParts, RestBounds, RestSeen, SessionStart, Sieve, TurnSeen, Unread};
 
 use crate::params::estimator::MotionParams;
 use crate::params::repeating::Repeating;
@@ -102,13 +102,30 @@ impl SensorParams {
         self.sessions.map_or(0.0, of)
     }
 
+    /// Turns of the readings; `None` in files of earlier versions.
+    fn turns_seen(&self) -> Option<TurnSeen<f64>> {
+        let turn = self.validity.turn() / self.rest_reading;
+        self.validity.longest_unturned_s.map(|longest_s| TurnSeen { turn, longest_s })
+    }
+
     /// Doubts of a filter that runs with that motion.
     #[must_use]
-    pub fn doubt_parts(&self, motion: &MotionParams) -> DoubtParts<f64> {
+    pub fn filters_doubts(&self, motion: &MotionParams) -> DoubtParts<f64> {
+        self.doubts(motion, self.unstated.filter_sd)
+    }
+
+    /// Doubts of a smoother, likewise.
+    #[must_use]
+    pub fn smoothers_doubts(&self, motion: &MotionParams) -> DoubtParts<f64> {
+        self.doubts(motion, self.unstated.smoother_sd)
+    }
+
+    fn doubts(&self, motion: &MotionParams, unstated_sd: f64) -> DoubtParts<f64> {
         let (seen, span) = (&self.validity, self.limits.span());
         let (low, high) = self.relative_readings();
         let unread = Unread::new(motion.rate_time_s, motion.rate_sd_per_s, self.limits.to_model());
         let per_reading = if high > low { span / (high - low) } else { 0.0 };
+        let unstated = self.session_variance(per_reading) + unstated_sd.powi(2);
         DoubtParts {
             low,
             high,
@@ -116,10 +133,11 @@ impl SensorParams {
             longest_s: if seen.drifts { seen.duration_s } else { f64::from(f32::MAX) },
             per_reading,
             start: (START * span).powi(2),
-            most: unread.anywhere,
-            session: self.session_variance(per_reading),
+            most: unread.anywhere.max(unstated),
+            unstated,
             unread,
             rest: self.rest_seen(),
+            turns: self.turns_seen(),
         }
     }
 }

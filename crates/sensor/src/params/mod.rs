@@ -9,6 +9,7 @@ pub(crate) mod range;
 mod repeating;
 pub(crate) mod static_cubic;
 pub(crate) mod summary;
+pub(crate) mod unstated;
 pub(crate) mod validate;
 
 use std::collections::BTreeMap;
@@ -22,6 +23,7 @@ use crate::params::law::LawParams;
 use crate::params::range::RangeParams;
 use crate::params::static_cubic::StaticCubic;
 use crate::params::summary::{Summary, TestedSummary};
+use crate::params::unstated::Unstated;
 
 /// Largest factor on the deviations of a calibrated filter. A larger one is a sign of another error: calibrations report when
 /// they reach it.
@@ -64,6 +66,9 @@ pub struct SensorParams {
     /// Differences between sessions; `None` for a calibration on one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sessions: Option<Sessions>,
+    /// Errors that the estimators do not state, from rows that the calibration was not fitted to.
+    #[serde(default, skip_serializing_if = "Unstated::is_none")]
+    pub unstated: Unstated,
     /// The static inverse to compare with.
     pub static_cubic: StaticCubic,
     /// A sensor glued across a joint, if it is one.
@@ -141,9 +146,25 @@ pub struct Validity {
     pub drifts: bool,
     /// Longest time for which a reading was repeated to the last digit, s.
     pub longest_repeat_s: f64,
+    /// Longest time between two turns of the readings, s: see [`Self::turn`]. `None` in files of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub longest_unturned_s: Option<f64>,
     /// Resolution of the readings; `None` in files of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub resolution: Option<Resolution>,
+}
+
+/// Share of the range of readings by which one of them has to go back to have turned, and number of their noise's deviations.
+const TURN: (f64, f64) = (0.03, 6.0);
+
+impl Validity {
+    /// Returns the way back of a reading that counts as a turn, in its unit.
+    #[must_use]
+    pub fn turn(&self) -> f64 {
+        let (share, deviations) = TURN;
+        let noise_sd = self.resolution.map_or(0.0, |resolution| resolution.noise_sd);
+        (share * (self.reading_upper - self.reading_lower)).max(deviations * noise_sd)
+    }
 }
 
 /// Resolution of the calibration's readings, in their unit: how often a still sensor repeats a number follows from it.

@@ -17,6 +17,7 @@ use crate::params::law::{GaugeParams, LawParams};
 use crate::params::range::RangeParams;
 use crate::params::static_cubic::StaticCubic;
 use crate::params::summary::{Summary, TestedSummary};
+use crate::params::unstated::Unstated;
 use crate::params::{JointParams, RecordingInfo, Resolution, SensorParams, Sessions, Uncertainty, Validity};
 
 /// Shortest range of strains, relative to its larger end.
@@ -45,6 +46,7 @@ impl SensorParams {
         self.validity.validate(&root.table("validity"))?;
         self.check_rest(&root)?;
         self.sessions.map_or(Ok(()), |sessions| sessions.validate(&root.table("sessions")))?;
+        self.unstated.validate(&root.table("unstated"))?;
         self.static_cubic.validate(&root.table("static_cubic"))?;
         if let Some(joint) = &self.joint {
             joint.validate(&root.table("joint"))?;
@@ -111,6 +113,13 @@ impl Sessions {
     }
 }
 
+impl Unstated {
+    fn validate(self, table: &Table) -> Result<(), FieldError> {
+        table.number("filter_sd", self.filter_sd, AMOUNT)?;
+        table.number("smoother_sd", self.smoother_sd, AMOUNT)
+    }
+}
+
 impl RangeParams {
     /// Checks every number.
     ///
@@ -132,6 +141,7 @@ impl Validity {
         table.number("fastest_rate_per_s", self.fastest_rate_per_s, TOLD_AMOUNT)?;
         table.number("duration_s", self.duration_s, TOLD_AMOUNT)?;
         table.number("longest_repeat_s", self.longest_repeat_s, TOLD_AMOUNT)?;
+        self.longest_unturned_s.map_or(Ok(()), |longest_s| table.number("longest_unturned_s", longest_s, POSITIVE))?;
         self.resolution.map_or(Ok(()), |resolution| resolution.validate(&table.table("resolution")))
     }
 }

@@ -7,7 +7,7 @@ pub(crate) type Taken<E, const N: usize, const L: usize> =
     PastStep<<E as Estimator<f64, N, L>>::State, Repeated<<E as Estimator<f64, N, L>>::Prepared, f64>, f64>;
 
 /// A row on the way forward, as a smoother needs it.
-pub(crate) enum Row<E: Estimator<f64, N, L>, const N: usize, const L: usize> {
+pub(crate) enum KeptStep<E: Estimator<f64, N, L>, const N: usize, const L: usize> {
     /// The step to a reading that was used.
     Read(Taken<E, N, L>),
     /// A row without one: the state that the readings before it predict, and the whole steps of the pause that the filter has
@@ -35,7 +35,7 @@ impl<S: Clone> Backward<S> {
         &mut self,
         estimator: &Substeps<E>,
         time_s: f64,
-        row: &Row<E, N, L>,
+        row: &KeptStep<E, N, L>,
         is_to_go_on: bool,
         show: impl FnOnce(&S),
     ) -> Result<bool, StepError>
@@ -45,7 +45,7 @@ impl<S: Clone> Backward<S> {
         let earlier =
             |step: &Taken<E, N, L>, later: &S| estimator.smooth_back(&step.from, &step.prepared, step.reading, later);
         match row {
-            Row::Read(step) => {
+            KeptStep::Read(step) => {
                 show(&self.smoothed);
                 if is_to_go_on {
                     let Some(earlier) = earlier(step, &self.smoothed)? else { return Ok(false) };
@@ -53,7 +53,7 @@ impl<S: Clone> Backward<S> {
                     self.ahead = Some((time_s, step.reading, smoothed));
                 }
             }
-            Row::Unread { predicted, whole } => {
+            KeptStep::Unread { predicted, whole } => {
                 match &self.ahead {
                     None => show(predicted),
                     Some((ahead_s, reading, smoothed)) => {

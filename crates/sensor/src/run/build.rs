@@ -265,9 +265,10 @@ fn bare_parts(estimator: &EstimatorParams, limits: RangeParams) -> LiveParts<f64
         per_reading: 0.0,
         start: 0.0,
         most: unread.anywhere,
-        session: 0.0,
+        unstated: 0.0,
         unread,
         rest: None,
+        turns: None,
     };
     LiveParts {
         rest_reading: 1.0,
@@ -292,7 +293,7 @@ impl SensorParams {
             rest_reading: self.rest_reading,
             rested: self.rested(),
             sieve: self.sieve().with_error_time(estimator.noise.reading_time_s),
-            doubt: self.doubt_parts(&estimator.motion),
+            doubt: self.filters_doubts(&estimator.motion),
             rest: self.rest_bounds(),
             ..bare_parts(estimator, self.limits)
         }

@@ -7,6 +7,7 @@ use ohmstrain_ekf::{Gaussian, Reading, ReadingVerdict, StepError};
 
 use crate::params::correction::{FUTURE_FEATURES, smoother_inputs};
 use crate::run::learned::{Learned, OfSmoother};
+use crate::run::turns::Turns;
 use crate::run::{Output, Rows, SEGMENT, WayBack};
 
 /// A smoother on its way back, corrected segment by segment. Everything but the strain is the smoother's.
@@ -39,7 +40,11 @@ impl Watched {
     }
 
     /// Takes a row in either direction of time.
-    fn step(&mut self, time_s: f64, Seen { reading, surprises }: Seen) -> Option<[f64; FEATURES]> {
+    fn step(
+        &mut self,
+        time_s: f64,
+        CorrectionReading { reading, surprises }: CorrectionReading,
+    ) -> Option<[f64; FEATURES]> {
         let dt_s = (time_s - self.time_s.unwrap_or(time_s)).abs();
         self.time_s = Some(time_s);
         self.features.step_unless(surprises, dt_s, reading)
@@ -53,13 +58,13 @@ impl Watched {
 
 /// Input of the correction at a row.
 #[derive(Clone, Copy)]
-struct Seen {
+struct CorrectionReading {
     reading: Option<f64>,
     /// True if the reading surprised the filter.
     surprises: bool,
 }
 
-impl Seen {
+impl CorrectionReading {
     /// Returns the reading as it was read.
     fn plain(reading: Option<Reading<f64>>) -> Self {
         let finite = |reading: Reading<f64>| Some(reading.value).filter(|value| value.is_finite());
@@ -93,7 +98,7 @@ impl<'a> CorrectedWayBack<'a> {
                 starts.push(past);
             }
             let (time_s, reading) = rows.get(row);
-            past.step(time_s, Seen::plain(reading));
+            past.step(time_s, CorrectionReading::plain(reading));
         }
         Self { back, correction, rows, starts, ahead: Watched::new(learned.future_scale()) }
     }
@@ -107,6 +112,10 @@ impl<'a> CorrectedWayBack<'a> {
 }
 
 impl WayBack for CorrectedWayBack<'_> {
+    fn turns(&self) -> &Turns {
+        self.back.turns()
+    }
+
     fn next_segment(&mut self, out: &mut Vec<Output>) -> Result<Option<Range<usize>>, (usize, StepError)> {
         let Some(rows) = self.back.next_segment(out)? else { return Ok(None) };
         let Some(mut past) = self.starts.pop() else { return Ok(Some(rows)) };
@@ -114,13 +123,13 @@ impl WayBack for CorrectedWayBack<'_> {
         let mut behind = Vec::with_capacity(rows.len());
         for (row, output) in rows.clone().zip(out.iter()) {
             let (time_s, reading) = self.rows.get(row);
-            let features = past.step(time_s, Seen::new(output, reading));
+            let features = past.step(time_s, CorrectionReading::new(output, reading));
             known = if past.missing() { known } else { Some(output.estimate.strain.variance) };
             behind.push((features, known));
         }
         for ((row, output), (past, known)) in rows.clone().zip(out.iter_mut()).zip(behind).rev() {
             let (time_s, reading) = self.rows.get(row);
-            let future = self.ahead.step(time_s, Seen::new(output, reading));
+            let future = self.ahead.step(time_s, CorrectionReading::new(output, reading));
             let smoothed = output.estimate.strain;
             if !self.ahead.missing() {
                 self.ahead.known_variance = Some(smoothed.variance);

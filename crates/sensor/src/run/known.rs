@@ -43,7 +43,7 @@ pub struct KnownStrain {
     /// The strain, and how well it is known.
     pub known: Gaussian<f64>,
     /// Estimate of the strain, without the effect of earlier known strains.
-    pub said: Gaussian<f64>,
+    pub estimated: Gaussian<f64>,
 }
 
 /// Errors of a filter at other times, from strains that were known for a moment.
@@ -58,12 +58,12 @@ pub struct KnownErrors {
     /// Mean of the variances that were stated of them.
     usual: f64,
     /// One for each size.
-    voices: Vec<Voice>,
+    sizes: Vec<ErrorSize>,
 }
 
 /// Errors of one size, conditioned on the known strains.
 #[derive(Clone, Debug)]
-struct Voice {
+struct ErrorSize {
     size: Size,
     /// Probability that it is this size.
     weight: f64,
@@ -74,7 +74,7 @@ struct Voice {
 
 /// A statement, as far as its error hangs together with that of another one.
 #[derive(Clone, Copy)]
-struct Place {
+struct EstimatePoint {
     time_s: f64,
     sd: f64,
     /// Distance from the middle of the limits, of variance one if the strain may be anywhere in them.
@@ -83,7 +83,7 @@ struct Place {
 
 impl Size {
     /// Returns the covariance of errors at two places; `usual` is the variance that the slow part is relative to.
-    fn covariance(self, usual: f64, a: Place, b: Place) -> f64 {
+    fn covariance(self, usual: f64, a: EstimatePoint, b: EstimatePoint) -> f64 {
         let apart_s = (a.time_s - b.time_s).abs();
         let fast = self.fast * a.sd * b.sd * (-apart_s / FAST_S).exp();
         fast + self.slow * usual * (-apart_s / SLOW_S).exp() * (1.0 + GAIN * a.lever * b.lever)
@@ -94,7 +94,7 @@ impl KnownErrors {
     /// Starts before any strain is known.
     #[must_use]
     pub const fn new(limits: StrainRange<f64>) -> Self {
-        Self { limits, strains: VecDeque::new(), usual: 0.0, voices: Vec::new() }
+        Self { limits, strains: VecDeque::new(), usual: 0.0, sizes: Vec::new() }
     }
 
     /// Conditions the errors on known strains, the last [`MOST_KNOWN`] of them.
@@ -116,10 +116,10 @@ impl KnownErrors {
     }
 
     /// Restates the estimate of the strain at a known time, which has changed since, for example after a lag.
-    pub fn restate(&mut self, time_s: f64, said: Gaussian<f64>) {
+    pub fn restate(&mut self, time_s: f64, estimated: Gaussian<f64>) {
         let mut is_new = false;
         for strain in self.strains.iter_mut().filter(|strain| strain.time_s == time_s) {
-            (strain.said, is_new) = (said, true);
+            (strain.estimated, is_new) = (estimated, true);
         }
         if is_new {
             self.condition();
@@ -139,37 +139,37 @@ impl KnownErrors {
 
     /// A statement at a time, without what is known of its error.
     #[must_use]
-    pub fn correct(&self, time_s: f64, said: Gaussian<f64>) -> Gaussian<f64> {
-        if self.voices.is_empty() {
-            return said;
+    pub fn correct(&self, time_s: f64, estimated: Gaussian<f64>) -> Gaussian<f64> {
+        if self.sizes.is_empty() {
+            return estimated;
         }
-        let here = self.place(time_s, &said);
-        let told = self.voices.iter().map(|voice| (voice.weight, voice.error(self.usual, here, self.places())));
-        let told: Vec<(f64, Gaussian<f64>)> = told.collect();
-        let mean = told.iter().map(|(weight, error)| weight * error.mean).sum::<f64>();
+        let here = self.place(time_s, &estimated);
+        let errors = self.sizes.iter().map(|size| (size.weight, size.error(self.usual, here, self.places())));
+        let errors: Vec<(f64, Gaussian<f64>)> = errors.collect();
+        let mean = errors.iter().map(|(weight, error)| weight * error.mean).sum::<f64>();
         let spread = |error: &Gaussian<f64>| error.variance + (error.mean - mean).powi(2);
-        let variance = told.iter().map(|(weight, error)| weight * spread(error)).sum();
-        Gaussian { mean: self.limits.clamp(said.mean + mean), variance }
+        let variance = errors.iter().map(|(weight, error)| weight * spread(error)).sum();
+        Gaussian { mean: self.limits.clamp(estimated.mean + mean), variance }
     }
 
-    fn place(&self, time_s: f64, said: &Gaussian<f64>) -> Place {
+    fn place(&self, time_s: f64, estimated: &Gaussian<f64>) -> EstimatePoint {
         let StrainRange { lower, upper } = self.limits;
-        let off = (said.mean - 0.5 * (lower + upper)) / (upper - lower);
-        Place { time_s, sd: said.sd(), lever: 12.0_f64.sqrt() * off.clamp(-FARTHEST, FARTHEST) }
+        let off = (estimated.mean - 0.5 * (lower + upper)) / (upper - lower);
+        EstimatePoint { time_s, sd: estimated.sd(), lever: 12.0_f64.sqrt() * off.clamp(-FARTHEST, FARTHEST) }
     }
 
-    fn places(&self) -> impl Iterator<Item = Place> {
-        self.strains.iter().map(|strain| self.place(strain.time_s, &strain.said))
+    fn places(&self) -> impl Iterator<Item = EstimatePoint> {
+        self.strains.iter().map(|strain| self.place(strain.time_s, &strain.estimated))
     }
 
     fn condition(&mut self) {
         if self.strains.is_empty() {
             return;
         }
-        let places: Vec<Place> = self.places().collect();
-        let errors = self.strains.iter().map(|strain| strain.known.mean - strain.said.mean);
+        let places: Vec<EstimatePoint> = self.places().collect();
+        let errors = self.strains.iter().map(|strain| strain.known.mean - strain.estimated.mean);
         let errors = DVector::from_iterator(places.len(), errors);
-        let usual = self.strains.iter().map(|strain| strain.said.variance).sum::<f64>() / places.len() as f64;
+        let usual = self.strains.iter().map(|strain| strain.estimated.variance).sum::<f64>() / places.len() as f64;
         let given = |size: Size| {
             let noise = |row: usize| self.strains[row].known.variance;
             let of =
@@ -178,25 +178,25 @@ impl KnownErrors {
             let weighted = covariance.solve(&errors);
             let log_determinant: f64 = covariance.l_dirty().diagonal().iter().map(|root| root.ln()).sum();
             let log_weight = size.probability.ln() - 0.5 * errors.dot(&weighted) - log_determinant;
-            Some(Voice { size, weight: log_weight, covariance, weighted })
+            Some(ErrorSize { size, weight: log_weight, covariance, weighted })
         };
-        let mut voices: Vec<Voice> = SIZES.into_iter().filter_map(given).collect();
-        let largest = voices.iter().map(|voice| voice.weight).fold(f64::NEG_INFINITY, f64::max);
-        voices.iter_mut().for_each(|voice| voice.weight = (voice.weight - largest).exp());
-        let total: f64 = voices.iter().map(|voice| voice.weight).sum();
-        voices.iter_mut().for_each(|voice| voice.weight /= total);
-        (self.usual, self.voices) = (usual, voices);
+        let mut sizes: Vec<ErrorSize> = SIZES.into_iter().filter_map(given).collect();
+        let largest = sizes.iter().map(|size| size.weight).fold(f64::NEG_INFINITY, f64::max);
+        sizes.iter_mut().for_each(|size| size.weight = (size.weight - largest).exp());
+        let total: f64 = sizes.iter().map(|size| size.weight).sum();
+        sizes.iter_mut().for_each(|size| size.weight /= total);
+        (self.usual, self.sizes) = (usual, sizes);
     }
 }
 
-impl Voice {
+impl ErrorSize {
     /// The error of a statement, if errors are of this size.
-    fn error(&self, usual: f64, here: Place, known: impl Iterator<Item = Place>) -> Gaussian<f64> {
+    fn error(&self, usual: f64, here: EstimatePoint, known: impl Iterator<Item = EstimatePoint>) -> Gaussian<f64> {
         let shared = known.map(|place| self.size.covariance(usual, here, place));
         let shared = DVector::from_iterator(self.weighted.len(), shared);
         let mean = shared.dot(&self.weighted);
-        let told = self.covariance.l_dirty().solve_lower_triangular(&shared).map_or(0.0, |told| told.norm_squared());
-        Gaussian { mean, variance: (self.size.covariance(usual, here, here) - told).max(0.0) }
+        let explained = self.covariance.l_dirty().solve_lower_triangular(&shared).map_or(0.0, |row| row.norm_squared());
+        Gaussian { mean, variance: (self.size.covariance(usual, here, here) - explained).max(0.0) }
     }
 }
 
@@ -206,12 +206,12 @@ mod tests {
 
     const LIMITS: StrainRange<f64> = StrainRange { lower: 0.0, upper: 0.4 };
 
-    fn strain(time_s: f64, known: f64, said: f64) -> KnownStrain {
-        let [known, said] = [(known, 4e-6), (said, 4e-4)].map(|(mean, variance)| Gaussian { mean, variance });
-        KnownStrain { time_s, known, said }
+    fn strain(time_s: f64, known: f64, estimated: f64) -> KnownStrain {
+        let [known, estimated] = [(known, 4e-6), (estimated, 4e-4)].map(|(mean, variance)| Gaussian { mean, variance });
+        KnownStrain { time_s, known, estimated }
     }
 
-    fn said(mean: f64) -> Gaussian<f64> {
+    fn estimate(mean: f64) -> Gaussian<f64> {
         Gaussian { mean, variance: 4e-4 }
     }
 
@@ -246,22 +246,22 @@ mod tests {
         let off = |count: usize| {
             let strains: Vec<_> = (0..count).map(|k| strain(60.0 * k as f64, 0.23, 0.2)).collect();
             let last_s = 60.0 * (count - 1) as f64;
-            KnownErrors::of(LIMITS, &strains).correct(last_s + 30.0, said(0.2)).mean - 0.2
+            KnownErrors::of(LIMITS, &strains).correct(last_s + 30.0, estimate(0.2)).mean - 0.2
         };
         assert!(off(1) < 0.15 * 0.03 && off(8) > 0.7 * 0.03, "{} {}", off(1), off(8));
         // One that is ten times what was stated can only be of another day.
-        let surprising = KnownErrors::of(LIMITS, &[strain(0.0, 0.3, 0.1)]).correct(30.0, said(0.1));
+        let surprising = KnownErrors::of(LIMITS, &[strain(0.0, 0.3, 0.1)]).correct(30.0, estimate(0.1));
         assert!(surprising.mean - 0.1 > 0.8 * 0.2, "{surprising:?}");
     }
 
     /// A gain of 0.8 that two strains tell, far from where they were known.
     #[test]
     fn two_strains_tell_the_gain() {
-        let strains = [(0.05, 0.1), (0.29, 0.4)].map(|(known, said)| strain(1000.0 * known, known, said));
+        let strains = [(0.05, 0.1), (0.29, 0.4)].map(|(known, estimated)| strain(1000.0 * known, known, estimated));
         let errors = KnownErrors::of(LIMITS, &strains);
         for mean in [0.15, 0.25, 0.35] {
             let expected = 0.05 + 0.8 * (mean - 0.1);
-            let found = errors.correct(600.0, said(mean));
+            let found = errors.correct(600.0, estimate(mean));
             assert!((found.mean - expected).abs() < 0.3 * (mean - expected).abs(), "{mean}: {found:?} {expected}");
         }
     }
@@ -271,16 +271,22 @@ mod tests {
     fn the_last_ones_count() {
         let strains: Vec<_> = (0..40).map(|k| strain(20.0 * f64::from(k), 0.2, 0.2 + 0.001 * f64::from(k))).collect();
         let mut errors = KnownErrors::new(LIMITS);
-        assert!(errors.is_empty() && errors.correct(3.0, said(0.1)) == said(0.1));
-        assert_eq!(KnownErrors::of(LIMITS, &[]).correct(3.0, said(0.1)), said(0.1));
+        assert!(errors.is_empty() && errors.correct(3.0, estimate(0.1)) == estimate(0.1));
+        assert_eq!(KnownErrors::of(LIMITS, &[]).correct(3.0, estimate(0.1)), estimate(0.1));
         strains.iter().for_each(|strain| errors.tell(*strain));
         let at_once = KnownErrors::of(LIMITS, &strains[40 - MOST_KNOWN..]);
-        assert_eq!(errors.correct(900.0, said(0.3)), at_once.correct(900.0, said(0.3)));
-        assert_eq!(errors.correct(900.0, said(0.3)), KnownErrors::of(LIMITS, &strains).correct(900.0, said(0.3)));
+        assert_eq!(errors.correct(900.0, estimate(0.3)), at_once.correct(900.0, estimate(0.3)));
+        assert_eq!(
+            errors.correct(900.0, estimate(0.3)),
+            KnownErrors::of(LIMITS, &strains).correct(900.0, estimate(0.3))
+        );
         // Where something else is stated later.
         let mut restated = strains.clone();
-        restated[30].said.mean = 0.1;
-        errors.restate(600.0, said(0.1));
-        assert_eq!(errors.correct(900.0, said(0.3)), KnownErrors::of(LIMITS, &restated).correct(900.0, said(0.3)));
+        restated[30].estimated.mean = 0.1;
+        errors.restate(600.0, estimate(0.1));
+        assert_eq!(
+            errors.correct(900.0, estimate(0.3)),
+            KnownErrors::of(LIMITS, &restated).correct(900.0, estimate(0.3))
+        );
     }
 }

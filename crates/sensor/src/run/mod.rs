@@ -11,6 +11,7 @@ pub(crate) mod portable;
 mod remembering;
 mod running;
 mod stored;
+pub(crate) mod turns;
 mod way_back;
 
 use std::ops::Range;
@@ -18,6 +19,8 @@ use std::ops::Range;
 use ohmstrain_ekf::live::{Doubts, Flags};
 use ohmstrain_ekf::{Estimate, Gaussian, Reading, ReadingVerdict, StepError};
 use serde::{Deserialize, Serialize};
+
+use crate::run::turns::Turns;
 
 /// The live filter of a sensor whose number of branches and estimator are known at run time only. Threads and tasks can own it.
 pub trait Filter: Send {
@@ -151,6 +154,9 @@ pub trait WayBack {
     /// # Errors
     /// The row at which a step failed, and why.
     fn next_segment(&mut self, out: &mut Vec<Output>) -> Result<Option<Range<usize>>, (usize, StepError)>;
+
+    /// Returns the times at which the readings turn.
+    fn turns(&self) -> &Turns;
 }
 
 /// Output of a filter or smoother at one row.

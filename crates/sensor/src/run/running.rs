@@ -3,18 +3,19 @@ use std::mem;
 use std::sync::Arc;
 
 use ohmstrain_ekf::correction::{FILTER_INPUTS, mixture};
-use ohmstrain_ekf::live::{Correct, Doubts, Flags, Heard, LiveFilter, LiveParts, LiveRow, SensorEstimator};
+use ohmstrain_ekf::live::{Correct, Doubts, Flags, LiveFilter, LiveParts, LiveRow, Measured, SensorEstimator};
 use ohmstrain_ekf::{Estimate, Estimator, Gaussian, PastStep, Reading, Settling, State, StepError};
 use ohmstrain_model::{StrainRange, SwitchedModel};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use crate::run::backward::{Backward, Row};
+use crate::run::backward::{Backward, KeptStep};
 use crate::run::clock::{Clock, floored};
 use crate::run::learned::{Learned, OfFilter};
 use crate::run::options::Options;
 use crate::run::remembering::Remembering;
 use crate::run::stored::{Stored, Waiting};
+use crate::run::turns::Turns;
 use crate::run::{Filter, Output};
 
 /// The live filter on a computer.
@@ -22,7 +23,7 @@ pub(crate) type Live<E, const N: usize, const L: usize> =
     LiveFilter<f64, Remembering<E, <E as Estimator<f64, N, L>>::Prepared>, SharedCorrection, N, L>;
 /// A row of it on the way forward.
 pub(crate) type LiveStep<E, const N: usize, const L: usize> =
-    Row<Remembering<E, <E as Estimator<f64, N, L>>::Prepared>, N, L>;
+    KeptStep<Remembering<E, <E as Estimator<f64, N, L>>::Prepared>, N, L>;
 
 /// A row, and the step that a smoother needs of it.
 pub(crate) type KeptRow<E, const N: usize, const L: usize> =
@@ -70,15 +71,15 @@ impl<const B: usize, const N: usize> Reports<B, N> {
     pub(crate) fn row<S: State<f64, N, L>, const L: usize>(
         &self,
         state: &S,
-        heard: &Heard<f64>,
+        measured: &Measured<f64>,
         sd_scale: f64,
     ) -> Output {
         Output {
             estimate: Estimate::new(&self.model, state, &self.limits, sd_scale, &self.settling),
-            nis: heard.nis,
-            verdict: heard.verdict,
+            nis: measured.nis,
+            verdict: measured.verdict,
             phases: state.phases(),
-            reading: heard.reading,
+            reading: measured.reading,
             doubts: Flags::NONE,
             rest_off: 0.0,
         }
@@ -88,14 +89,14 @@ impl<const B: usize, const N: usize> Reports<B, N> {
 /// A row whose estimate waits for later readings.
 pub(crate) struct Pending<E: SensorEstimator<f64, N, L>, const N: usize, const L: usize> {
     pub time_s: f64,
-    pub said: Said,
+    pub reported: Reported,
     pub row: LiveStep<E, N, L>,
 }
 
 /// A row as it was reported when it came.
 #[derive(Clone, Copy)]
-pub(crate) struct Said {
-    pub heard: Heard<f64>,
+pub(crate) struct Reported {
+    pub measured: Measured<f64>,
     /// The corrected strain before doubts, and how much larger innovations had been than stated; `None` without a correction.
     pub corrected: Option<(Gaussian<f64>, f64)>,
     pub doubts: Doubts<f64>,
@@ -149,19 +150,26 @@ where
         let before = self.live.state().clone();
         let row = self.row(time_s, reading)?;
         let step = match &row.look {
-            None => Row::Read(self.live.past_step(&before, &row.heard)),
+            None => KeptStep::Read(self.live.past_step(&before, &row.measured)),
             Some(look) => {
                 let whole = self.live.substeps().prepare_whole(row.pause);
                 let whole = whole.map(|prepared| Box::new(PastStep { from: before, prepared, reading: None }));
-                Row::Unread { predicted: Box::new(look.clone()), whole }
+                KeptStep::Unread { predicted: Box::new(look.clone()), whole }
             }
         };
         Ok((row, step))
     }
 
+    /// Notes a turn of the readings at the last row.
+    pub(crate) fn watch(&self, turns: &mut Turns, time_s: f64, measured: &Measured<f64>) {
+        if let Some(watch) = self.live.doubts().turns().filter(|_| measured.used.is_some()) {
+            turns.see(time_s, watch);
+        }
+    }
+
     /// Output of a smoother at a row.
-    pub(crate) fn smoothed_row(&self, state: &E::State, heard: &Heard<f64>) -> Output {
-        self.reports.row(state, heard, self.reports.smoothed_scale)
+    pub(crate) fn smoothed_row(&self, state: &E::State, measured: &Measured<f64>) -> Output {
+        self.reports.row(state, measured, self.reports.smoothed_scale)
     }
 
     /// Widens the strain's interval by the doubts, if there are any.
@@ -176,17 +184,17 @@ where
 
     /// Returns the output of a row given later readings: mixed with its first estimate if there is a correction, and with the
     /// doubts of that time.
-    fn lagged_row(&self, state: &E::State, said: &Said) -> Output {
+    fn lagged_row(&self, state: &E::State, reported: &Reported) -> Output {
         let scale = self.reports.filtered_scale.max(self.reports.smoothed_scale);
-        let mut output = self.reports.row(state, &said.heard, scale);
-        output.rest_off = said.rest_off;
+        let mut output = self.reports.row(state, &reported.measured, scale);
+        output.rest_off = reported.rest_off;
         let lagged = output.estimate.strain;
-        let stated = said.corrected.map_or(lagged, |(corrected, birge)| {
+        let stated = reported.corrected.map_or(lagged, |(corrected, birge)| {
             mixture([corrected, Gaussian { variance: lagged.variance * birge, ..lagged }])
         });
-        let open = if said.heard.used.is_some() { stated.variance } else { said.doubts.open(stated) };
-        let widened = said.doubts.widened(output.estimate.rate.mean, open);
-        self.widen(&mut output, &said.doubts, stated, widened);
+        let open = if reported.measured.used.is_some() { stated.variance } else { reported.doubts.open(stated) };
+        let widened = reported.doubts.widened(Gaussian { variance: open, ..stated }, output.estimate.rate.mean);
+        self.widen(&mut output, &reported.doubts, stated, widened);
         output
     }
 
@@ -195,10 +203,12 @@ where
         let mut due = mem::take(&mut self.due);
         let mut back = Backward::new(last);
         let mut smoothed = Ok(true);
-        for (place, Pending { time_s, said, row }) in self.pending.iter().enumerate().rev().take_while(|_| count > 0) {
+        for (place, Pending { time_s, reported, row }) in
+            self.pending.iter().enumerate().rev().take_while(|_| count > 0)
+        {
             let show = |state: &E::State| {
                 if place < count {
-                    due.push(self.lagged_row(state, said));
+                    due.push(self.lagged_row(state, reported));
                 }
             };
             smoothed = back.over(self.live.substeps(), *time_s, row, place > 0, show);
@@ -216,9 +226,9 @@ where
     }
 
     /// The state after a row, before the filter looked again: nothing leads back over a hypothesis that comes from nowhere.
-    fn state_after(&self, heard: &Heard<f64>, row: &LiveStep<E, N, L>) -> Result<E::State, StepError> {
+    fn state_after(&self, measured: &Measured<f64>, row: &LiveStep<E, N, L>) -> Result<E::State, StepError> {
         match row {
-            Row::Read(step) if heard.jumped.is_some() => {
+            KeptStep::Read(step) if measured.jumped.is_some() => {
                 let taken = self.live.substeps().advance(&step.from, &step.prepared, step.reading)?;
                 Ok(taken.state)
             }
@@ -237,7 +247,7 @@ where
 
     fn settle(&mut self) {
         self.live.settle();
-        self.pending.iter_mut().for_each(|row| row.said.doubts.settle());
+        self.pending.iter_mut().for_each(|row| row.reported.doubts.settle());
     }
 
     fn step(&mut self, time_s: f64, reading: Option<Reading<f64>>) -> Result<(), StepError> {
@@ -251,9 +261,9 @@ where
 
     fn output(&self) -> Output {
         let scale = self.reports.filtered_scale;
-        let Some(row) = &self.last else { return self.reports.row(self.live.state(), &Heard::nothing(), scale) };
+        let Some(row) = &self.last else { return self.reports.row(self.live.state(), &Measured::nothing(), scale) };
         let state = row.look.as_ref().unwrap_or_else(|| self.live.state());
-        let mut output = self.reports.row(state, &row.heard, scale);
+        let mut output = self.reports.row(state, &row.measured, scale);
         output.rest_off = self.live.rest_off();
         self.widen(&mut output, self.live.doubts(), row.stated, (row.estimate.strain.variance, row.doubts));
         output
@@ -272,12 +282,13 @@ where
         self.emit(overdue, now, out)?;
         let birge = self.live.doubts().birge();
         let (row, step) = self.kept_row(time_s, reading)?;
-        let state = self.state_after(&row.heard, &step)?;
+        let state = self.state_after(&row.measured, &step)?;
         let corrected = self.live.is_corrected().then_some((row.stated, birge));
-        let said = Said { heard: row.heard, corrected, doubts: *self.live.doubts(), rest_off: self.live.rest_off() };
-        self.pending.push_back(Pending { time_s, said, row: step });
+        let reported =
+            Reported { measured: row.measured, corrected, doubts: *self.live.doubts(), rest_off: self.live.rest_off() };
+        self.pending.push_back(Pending { time_s, reported, row: step });
         // No row waits for what comes after a jump.
-        let jumped = row.heard.jumped.is_some();
+        let jumped = row.measured.jumped.is_some();
         let due = self.pending.partition_point(|row| jumped || row.time_s + lag_s <= time_s);
         self.last = Some(row);
         self.emit(due, state, out)

@@ -1,15 +1,15 @@
 //! A running filter as plain data.
 
-use ohmstrain_ekf::live::{Doubts, Heard, LiveRow, Memory, SensorEstimator};
+use ohmstrain_ekf::live::{Doubts, LiveRow, Measured, Memory, SensorEstimator};
 use ohmstrain_ekf::{Gaussian, PastStep, Pause, Reading, Repeated, Substeps};
 use serde::de::{DeserializeOwned, Error as _};
 use serde::{Deserialize, Serialize};
 use toml::{Value, de, ser};
 
-use crate::run::backward::Row;
+use crate::run::backward::KeptStep;
 use crate::run::clock::Clock;
 use crate::run::remembering::Remembering;
-use crate::run::running::{LiveStep, Pending, Said};
+use crate::run::running::{LiveStep, Pending, Reported};
 
 /// State that the next row depends on. Prepared steps are not in it: they follow from their lengths. Estimators' states are TOML already:
 /// a program would have all of this once for each type of them.
@@ -27,15 +27,15 @@ pub(crate) struct Stored {
 #[serde(deny_unknown_fields)]
 pub(crate) struct Waiting {
     time_s: f64,
-    heard: Heard<f64>,
+    measured: Measured<f64>,
     corrected: Option<Corrected>,
     doubts: Doubts<f64>,
     rest_off: f64,
     /// The step to a reading that was used.
-    read: Option<Step>,
+    read: Option<StoredStep>,
     /// The state that is predicted at a row without one, and the whole steps of the pause.
     predicted: Option<Value>,
-    whole: Option<Step>,
+    whole: Option<StoredStep>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -48,13 +48,13 @@ struct Corrected {
 /// A step: where it started, how long it was and what was read at its end.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Step {
+struct StoredStep {
     from: Value,
     pause: Pause<f64>,
     reading: Option<Reading<f64>>,
 }
 
-impl Step {
+impl StoredStep {
     fn of<S: Serialize, P>(step: &PastStep<S, Repeated<P, f64>, f64>) -> Result<Self, ser::Error> {
         Ok(Self { from: Value::try_from(&step.from)?, pause: step.prepared.pause(), reading: step.reading })
     }
@@ -72,16 +72,16 @@ impl Waiting {
     where
         E: SensorEstimator<f64, N, L, State: Serialize>,
     {
-        let Said { heard, corrected, doubts, rest_off } = pending.said;
+        let Reported { measured, corrected, doubts, rest_off } = pending.reported;
         let corrected = corrected.map(|(strain, birge)| Corrected { strain, birge });
         let (read, predicted, whole) = match &pending.row {
-            Row::Read(step) => (Some(Step::of(step)?), None, None),
-            Row::Unread { predicted, whole } => {
-                let whole = whole.as_ref().map(|step| Step::of(step)).transpose()?;
+            KeptStep::Read(step) => (Some(StoredStep::of(step)?), None, None),
+            KeptStep::Unread { predicted, whole } => {
+                let whole = whole.as_ref().map(|step| StoredStep::of(step)).transpose()?;
                 (None, Some(Value::try_from(predicted.as_ref())?), whole)
             }
         };
-        Ok(Self { time_s: pending.time_s, heard, corrected, doubts, rest_off, read, predicted, whole })
+        Ok(Self { time_s: pending.time_s, measured, corrected, doubts, rest_off, read, predicted, whole })
     }
 
     /// The row, with steps as this estimator prepares them.
@@ -93,22 +93,22 @@ impl Waiting {
         E: SensorEstimator<f64, N, L, State: DeserializeOwned>,
     {
         let neither = || de::Error::custom("`waiting`: expected rows with `read` or `predicted`");
-        let Self { time_s, heard, corrected, doubts, rest_off, read, predicted, whole } = self;
+        let Self { time_s, measured, corrected, doubts, rest_off, read, predicted, whole } = self;
         let corrected = corrected.map(|Corrected { strain, birge }| (strain, birge));
         let row: LiveStep<E, N, L> = match (read, predicted) {
             (Some(step), None) if whole.is_none() => {
                 let prepared = estimator.prepare_over::<f64, N, L>(step.pause);
-                Row::Read(step.taken(prepared)?)
+                KeptStep::Read(step.taken(prepared)?)
             }
             (None, Some(predicted)) => {
                 let whole = whole.map(|step| {
                     let prepared = estimator.prepare_whole::<f64, N, L>(step.pause).ok_or_else(neither)?;
                     step.taken(prepared).map(Box::new)
                 });
-                Row::Unread { predicted: Box::new(predicted.try_into()?), whole: whole.transpose()? }
+                KeptStep::Unread { predicted: Box::new(predicted.try_into()?), whole: whole.transpose()? }
             }
             _ => return Err(neither()),
         };
-        Ok(Pending { time_s, said: Said { heard, corrected, doubts, rest_off }, row })
+        Ok(Pending { time_s, reported: Reported { measured, corrected, doubts, rest_off }, row })
     }
 }

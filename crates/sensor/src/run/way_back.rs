@@ -2,12 +2,13 @@ use std::mem;
 use std::ops::Range;
 
 use ohmstrain_ekf::StepError;
-use ohmstrain_ekf::live::{Heard, Memory, SensorEstimator};
+use ohmstrain_ekf::live::{Measured, Memory, SensorEstimator};
 
 use crate::run::backward::Backward;
 use crate::run::clock::Clock;
 use crate::run::corrected::CorrectedWayBack;
 use crate::run::running::{LiveStep, Running};
+use crate::run::turns::Turns;
 use crate::run::{Output, Rows, SEGMENT, Smoother, WayBack};
 
 /// The way back through a recording: segments but the last are filtered once more, from the state before their first rows.
@@ -19,9 +20,11 @@ pub(crate) struct Segments<'a, E: SensorEstimator<f64, N, L>, const B: usize, co
     /// The way back over those that are.
     back: Backward<E::State>,
     /// The present segment.
-    steps: Vec<(Heard<f64>, LiveStep<E, N, L>)>,
+    steps: Vec<(Measured<f64>, LiveStep<E, N, L>)>,
     /// True if that is the last segment, whose steps are there already.
     is_last: bool,
+    /// Turns of all readings.
+    turns: Turns,
 }
 
 impl<'a, E, const B: usize, const N: usize, const L: usize> Segments<'a, E, B, N, L>
@@ -32,36 +35,43 @@ where
     pub(crate) fn new(running: &'a mut Running<E, B, N, L>, rows: Rows<'a>) -> Result<Self, (usize, StepError)> {
         let mut starts = Vec::with_capacity(rows.len() / SEGMENT + 1);
         let last = rows.len().saturating_sub(1) / SEGMENT * SEGMENT;
+        let mut turns = Turns::default();
         for row in 0..last {
             if row % SEGMENT == 0 {
                 starts.push((running.clock, running.live.memory()));
             }
             let (time_s, reading) = rows.get(row);
-            running.row(time_s, reading).map_err(|error| (row, error))?;
+            let taken = running.row(time_s, reading).map_err(|error| (row, error))?;
+            running.watch(&mut turns, time_s, &taken.measured);
         }
         if last < rows.len() {
             starts.push((running.clock, running.live.memory()));
         }
         let mut steps = Vec::new();
-        steps_of(running, rows, last..rows.len(), &mut steps)?;
+        let watch = |running: &Running<E, B, N, L>, time_s, measured: &Measured<f64>| {
+            running.watch(&mut turns, time_s, measured)
+        };
+        steps_of(running, rows, last..rows.len(), &mut steps, watch)?;
         let back = Backward::new(running.live.state().clone());
-        Ok(Self { running, rows, starts, back, steps, is_last: true })
+        Ok(Self { running, rows, starts, back, steps, is_last: true, turns })
     }
 }
 
-/// Filters a segment from where the filter is, and keeps its steps.
+/// Filters a segment from where the filter is, and keeps its steps; `after` is called with time, s, and result of each.
 fn steps_of<E: SensorEstimator<f64, N, L>, const B: usize, const N: usize, const L: usize>(
     running: &mut Running<E, B, N, L>,
     rows: Rows<'_>,
     segment: Range<usize>,
-    steps: &mut Vec<(Heard<f64>, LiveStep<E, N, L>)>,
+    steps: &mut Vec<(Measured<f64>, LiveStep<E, N, L>)>,
+    mut after: impl FnMut(&Running<E, B, N, L>, f64, &Measured<f64>),
 ) -> Result<(), (usize, StepError)> {
     steps.clear();
     steps.reserve_exact(segment.len());
     for row in segment {
         let (time_s, reading) = rows.get(row);
         let (taken, step) = running.kept_row(time_s, reading).map_err(|error| (row, error))?;
-        steps.push((taken.heard, step));
+        after(running, time_s, &taken.measured);
+        steps.push((taken.measured, step));
     }
     Ok(())
 }
@@ -70,6 +80,10 @@ impl<E, const B: usize, const N: usize, const L: usize> WayBack for Segments<'_,
 where
     E: SensorEstimator<f64, N, L>,
 {
+    fn turns(&self) -> &Turns {
+        &self.turns
+    }
+
     fn next_segment(&mut self, out: &mut Vec<Output>) -> Result<Option<Range<usize>>, (usize, StepError)> {
         out.clear();
         let Some((clock, memory)) = self.starts.pop() else { return Ok(None) };
@@ -79,11 +93,11 @@ where
         if !mem::take(&mut self.is_last) {
             self.running.clock = clock;
             self.running.live.return_to(&memory);
-            steps_of(self.running, self.rows, rows.clone(), &mut self.steps)?;
+            steps_of(self.running, self.rows, rows.clone(), &mut self.steps, |_, _, _| {})?;
         }
-        for (row, (heard, step)) in rows.clone().zip(&self.steps).rev() {
+        for (row, (measured, step)) in rows.clone().zip(&self.steps).rev() {
             let (running, time_s) = (&*self.running, self.rows.get(row).0);
-            let show = |state: &E::State| out.push(running.smoothed_row(state, heard));
+            let show = |state: &E::State| out.push(running.smoothed_row(state, measured));
             let back = self.back.over(running.live.substeps(), time_s, step, true, show);
             if !back.map_err(|error| (row, error))? {
                 out.clear();

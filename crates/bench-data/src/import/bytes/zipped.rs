@@ -77,7 +77,7 @@ struct Size {
 
 /// A row that has begun.
 #[derive(Default)]
-struct Row {
+struct OpenRow {
     repeats: usize,
     columns: usize,
     /// Columns up to the last cell that is not empty.
@@ -91,12 +91,13 @@ fn count(source: impl BufRead) -> Result<(), TooMuch> {
     let mut reader = Reader::from_reader(source);
     reader.config_mut().check_end_names = false;
     reader.config_mut().expand_empty_elements = true;
-    let (mut size, mut row, mut budget, mut buffer) = (Size::default(), Row::default(), Budget::default(), Vec::new());
+    let (mut size, mut row, mut budget, mut buffer) =
+        (Size::default(), OpenRow::default(), Budget::default(), Vec::new());
     loop {
         match reader.read_event_into(&mut buffer).map_err(|error| error.to_string())? {
             Event::Start(tag) => match tag.name().as_ref() {
                 "table:table-row" => {
-                    row = Row { repeats: repeats(&tag, "table:number-rows-repeated"), ..Row::default() };
+                    row = OpenRow { repeats: repeats(&tag, "table:number-rows-repeated"), ..OpenRow::default() };
                 }
                 "table:table-cell" | "table:covered-table-cell" => {
                     row.cell = repeats(&tag, "table:number-columns-repeated");
@@ -123,7 +124,7 @@ fn count(source: impl BufRead) -> Result<(), TooMuch> {
     }
 }
 
-impl Row {
+impl OpenRow {
     fn fill(&mut self, bytes: usize) {
         self.width = self.columns;
         self.bytes = self.bytes.saturating_add((bytes as u64).saturating_mul(self.cell as u64));
@@ -131,7 +132,7 @@ impl Row {
 }
 
 impl Size {
-    fn add(&mut self, row: &Row) -> Result<(), TooMuch> {
+    fn add(&mut self, row: &OpenRow) -> Result<(), TooMuch> {
         self.rows = self.rows.saturating_add(row.repeats);
         if row.width == 0 {
             return Ok(());

@@ -1,5 +1,5 @@
 use crate::import::error::{ImportError, quoted};
-use crate::import::roles::decision::{Clock, Place, Taken};
+use crate::import::roles::decision::{Clock, FileColumn, Taken};
 use crate::import::roles::facts::{Candidate, Found};
 use crate::import::roles::find::{find, refer, several};
 use crate::import::roles::recipe::Recipe;
@@ -13,7 +13,7 @@ pub(crate) fn clock(
     found: &Found,
     answers: &Recipe,
     role: Role,
-    value: Place,
+    value: FileColumn,
     remarks: &mut Vec<String>,
 ) -> Result<Clock, ImportError> {
     if let Some(Some(wanted)) = answers.column(role) {
@@ -46,10 +46,10 @@ pub(crate) fn clock(
         })?,
     };
     let name = table.name(column);
-    if found.is_coarse(Place { column, ..value }) {
+    if found.is_coarse(FileColumn { column, ..value }) {
         let others: Vec<usize> = found.rising(value.file).into_iter().filter(|other| *other != column).collect();
         if !others.is_empty() {
-            return Err(too_coarse(found, Place { column, ..value }, role, &others));
+            return Err(too_coarse(found, FileColumn { column, ..value }, role, &others));
         }
     }
     if times.len() > 1 {
@@ -61,7 +61,7 @@ pub(crate) fn clock(
     }
     // Unless it is another column, the reference's clock is under the name that the readings' has.
     let role = if role == Role::ReferenceTime && times.len() == 1 { Role::Time } else { role };
-    channel(found, answers, Taken { role, place: Place { column, ..value } }, remarks).map(Clock::Column)
+    channel(found, answers, Taken { role, place: FileColumn { column, ..value } }, remarks).map(Clock::Column)
 }
 
 /// Leaves out clocks that do not tell rows apart, if there are others; what is to be remarked of that.
@@ -76,7 +76,7 @@ fn without_coarse(found: &Found, times: &mut Vec<&Candidate>) -> Option<String> 
 }
 
 /// The clock that the names lead to does not tell rows apart, and other columns increase.
-fn too_coarse(found: &Found, place: Place, role: Role, others: &[usize]) -> ImportError {
+fn too_coarse(found: &Found, place: FileColumn, role: Role, others: &[usize]) -> ImportError {
     let (table, repeated) = (found.table(place), found.facts(place).repeated);
     let mut answers = rising_answers(found, place.file, role, others);
     answers.push("--rate-hz HZ if the rows are evenly spaced".to_owned());
@@ -113,7 +113,7 @@ fn no_time(found: &Found, file: usize, role: Role) -> ImportError {
 /// Answers that name each of these columns.
 fn rising_answers(found: &Found, file: usize, role: Role, columns: &[usize]) -> Vec<String> {
     let answer = |column: &usize| {
-        let column = refer(found.tables, Place { file, column: *column });
+        let column = refer(found.tables, FileColumn { file, column: *column });
         format!("--column {}", quoted(&format!("{role}={column}")))
     };
     columns.iter().map(answer).collect()

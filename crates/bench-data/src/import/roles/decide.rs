@@ -3,7 +3,7 @@ use std::collections::BTreeSet;
 use crate::error::Fault;
 use crate::import::error::{ImportError, quoted};
 use crate::import::roles::clock::{clock, no_readings};
-use crate::import::roles::decision::{Channel, Decision, Place, Taken, Timed};
+use crate::import::roles::decision::{Channel, Decision, FileColumn, Taken, Timed};
 use crate::import::roles::facts::Found;
 use crate::import::roles::find::{choose, find, refer};
 use crate::import::roles::recipe::Recipe;
@@ -119,7 +119,7 @@ pub(crate) fn is_stretch_without_zero(found: &Found, answers: &Recipe, decision:
 }
 
 /// Refuses a label that is not in every other record of its file: what the records are has not been understood.
-fn incomplete_records(found: &Found, place: Place) -> Option<ImportError> {
+fn incomplete_records(found: &Found, place: FileColumn) -> Option<ImportError> {
     let table = found.table(place);
     let is_record = table.layout.separator == Some(SEPARATOR);
     let (missing, first) =
@@ -131,7 +131,7 @@ fn incomplete_records(found: &Found, place: Place) -> Option<ImportError> {
 }
 
 /// Returns a remark if one of several references is chosen because it shares the readings' name.
-fn by_its_name(found: &Found, answers: &Recipe, reference: Place, readings: Place) -> Option<String> {
+fn by_its_name(found: &Found, answers: &Recipe, reference: FileColumn, readings: FileColumn) -> Option<String> {
     let is_answered = Role::REFERENCES.iter().any(|role| answers.column(*role).is_some());
     let references = found.candidates.iter().filter(|one| one.is_named && Role::REFERENCES.contains(&one.role)).count();
     let (file, name, beside) = (&found.table(reference).file, found.name(reference), found.name(readings));

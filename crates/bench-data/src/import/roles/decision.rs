@@ -3,7 +3,7 @@ use crate::import::words::{Role, Unit};
 
 /// Place of a column: the file and the column in it, counted from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Place {
+pub(crate) struct FileColumn {
     pub file: usize,
     pub column: usize,
 }
@@ -12,14 +12,14 @@ pub(crate) struct Place {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Taken {
     pub role: Role,
-    pub place: Place,
+    pub place: FileColumn,
 }
 
 /// A column that numbers are taken from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Channel {
     pub role: Role,
-    pub place: Place,
+    pub place: FileColumn,
     pub unit: Unit,
 }
 

@@ -2,7 +2,7 @@ use std::cell::OnceCell;
 
 use crate::error::quote;
 use crate::import::bytes::Cell;
-use crate::import::roles::decision::Place;
+use crate::import::roles::decision::FileColumn;
 use crate::import::roles::preset::Preset;
 use crate::import::table::number_of;
 use crate::import::table::{Column, MONITOR_CLOCK, Table};
@@ -29,8 +29,8 @@ pub struct Candidate {
 }
 
 impl Candidate {
-    pub(crate) const fn place(&self) -> Place {
-        Place { file: self.table, column: self.column }
+    pub(crate) const fn place(&self) -> FileColumn {
+        FileColumn { file: self.table, column: self.column }
     }
 }
 
@@ -146,37 +146,37 @@ impl<'a> Found<'a> {
         }
     }
 
-    pub(crate) fn table(&self, place: Place) -> &'a Table {
+    pub(crate) fn table(&self, place: FileColumn) -> &'a Table {
         &self.tables[place.file]
     }
 
-    pub(crate) fn column(&self, place: Place) -> &'a Column {
+    pub(crate) fn column(&self, place: FileColumn) -> &'a Column {
         &self.tables[place.file].columns[place.column]
     }
 
-    pub(crate) fn facts(&self, place: Place) -> &Facts {
+    pub(crate) fn facts(&self, place: FileColumn) -> &Facts {
         self.facts[place.file][place.column].get_or_init(|| Facts::of(self.table(place), place.column))
     }
 
     /// Returns the name of a column in messages.
-    pub(crate) fn name(&self, place: Place) -> String {
+    pub(crate) fn name(&self, place: FileColumn) -> String {
         self.table(place).name(place.column)
     }
 
     /// All columns of all files.
-    pub(crate) fn places(&self) -> impl Iterator<Item = Place> {
+    pub(crate) fn places(&self) -> impl Iterator<Item = FileColumn> {
         let files = self.tables.iter().enumerate();
-        files.flat_map(|(file, table)| (0..table.columns.len()).map(move |column| Place { file, column }))
+        files.flat_map(|(file, table)| (0..table.columns.len()).map(move |column| FileColumn { file, column }))
     }
 
     /// True if a column of times does not tell rows apart.
-    pub(crate) fn is_coarse(&self, place: Place) -> bool {
+    pub(crate) fn is_coarse(&self, place: FileColumn) -> bool {
         is_coarse(self.facts(place).repeated, self.table(place).len())
     }
 
     /// Columns of a file whose numbers increase from row to row.
     pub(crate) fn rising(&self, file: usize) -> Vec<usize> {
-        let rises = |column: &usize| self.facts(Place { file, column: *column }).numbers.rise;
+        let rises = |column: &usize| self.facts(FileColumn { file, column: *column }).numbers.rise;
         (0..self.facts[file].len()).filter(rises).collect()
     }
 }

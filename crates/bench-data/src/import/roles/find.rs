@@ -1,5 +1,5 @@
 use crate::import::error::{ImportError, quoted};
-use crate::import::roles::decision::{Place, Taken};
+use crate::import::roles::decision::{FileColumn, Taken};
 use crate::import::roles::facts::Found;
 use crate::import::roles::recipe::{ColumnName, NO_COLUMN, Recipe};
 use crate::import::table::Table;
@@ -11,12 +11,12 @@ const COUNTED: char = '#';
 const MOST_NAMED: usize = 6;
 
 /// The column that an answer names.
-pub(crate) fn find(found: &Found, role: Role, wanted: &ColumnName) -> Result<Place, ImportError> {
+pub(crate) fn find(found: &Found, role: Role, wanted: &ColumnName) -> Result<FileColumn, ImportError> {
     let all = || found.places().filter(|place| wanted.file.is_none_or(|file| file == place.file + 1));
     let text = wanted.column.trim();
     let lower = text.to_lowercase();
     let number = text.strip_prefix(COUNTED).unwrap_or(text).parse::<usize>().ok();
-    let fits = |way: usize, place: Place| {
+    let fits = |way: usize, place: FileColumn| {
         let column = found.column(place);
         match way {
             0 => column.heading == text,
@@ -59,7 +59,7 @@ pub(crate) fn several(found: &Found, what: &str, taken: &[Taken]) -> ImportError
 }
 
 /// The shortest sure way to name a column: its heading if that is the only one and can be typed, its number otherwise.
-pub(crate) fn refer(tables: &[Table], place: Place) -> ColumnName {
+pub(crate) fn refer(tables: &[Table], place: FileColumn) -> ColumnName {
     let columns = &tables[place.file].columns;
     let heading = &columns[place.column].heading;
     let are_called = |name: &str| columns.iter().filter(|column| column.heading == name || column.name == name).count();
@@ -80,8 +80,8 @@ pub(crate) fn refer(tables: &[Table], place: Place) -> ColumnName {
 }
 
 /// The one of several columns whose name has the same stem as another column's: `Thumb angle` beside `Thumb`.
-fn paired(found: &Found, taken: &[Taken], beside: Place) -> Option<Taken> {
-    let stem = |place: Place| names::stem(&found.column(place).name);
+fn paired(found: &Found, taken: &[Taken], beside: FileColumn) -> Option<Taken> {
+    let stem = |place: FileColumn| names::stem(&found.column(place).name);
     let wanted = stem(beside);
     let mut fitting = taken.iter().filter(|taken| !wanted.is_empty() && stem(taken.place) == wanted);
     fitting.next().copied().filter(|_| fitting.next().is_none())
@@ -93,7 +93,7 @@ pub(crate) fn choose(
     answers: &Recipe,
     roles: &[Role],
     what: &str,
-    beside: Option<Place>,
+    beside: Option<FileColumn>,
 ) -> Result<Option<Taken>, ImportError> {
     let named = roles.iter().find_map(|role| answers.column(*role).flatten().map(|wanted| (*role, wanted)));
     if let Some((role, wanted)) = named {

@@ -12,7 +12,7 @@ mod tests;
 mod unit;
 
 pub(crate) use decide::{decide, is_stretch_without_zero};
-pub(crate) use decision::{Channel, Clock, Decision, Place, Timed};
+pub(crate) use decision::{Channel, Clock, Decision, FileColumn, Timed};
 pub use facts::{Candidate, candidates};
 pub(crate) use facts::{Found, is_coarse};
 pub(crate) use find::refer;

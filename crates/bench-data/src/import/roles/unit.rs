@@ -146,11 +146,11 @@ impl Asked<'_> {
                     None => (seconds.then_some("s"), format!("steps of {:.3}", numbers.step)),
                 }
             }
-            // What has a unit in each cell has it there.
-            Role::Resistance if let Some(cell) = &(self.facts)().prefixed => {
-                (Some("ohm"), format!("cells such as {cell} have"))
-            }
-            Role::Resistance => ((numbers.size >= LEAST_OHM).then_some("ohm"), format!("about {:.0}", numbers.size)),
+            Role::Resistance => match &(self.facts)().prefixed {
+                // What has a unit in each cell has it there.
+                Some(cell) => (Some("ohm"), format!("cells such as {cell} have")),
+                None => ((numbers.size >= LEAST_OHM).then_some("ohm"), format!("about {:.0}", numbers.size)),
+            },
             Role::Strain if self.is_stretch_ratio() => {
                 (Some("1"), format!("about {:.3}, a stretch ratio", numbers.median))
             }

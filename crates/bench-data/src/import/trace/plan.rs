@@ -1,6 +1,6 @@
 use crate::import::error::ImportError;
 use crate::import::roles::{
-    Align, Channel, Decision, Found, PerFile, Place, Recipe, decide, is_stretch_without_zero, refer,
+    Align, Channel, Decision, FileColumn, Found, PerFile, Recipe, decide, is_stretch_without_zero, refer,
 };
 use crate::import::series::{Values, alternation};
 use crate::import::table::Table;
@@ -98,7 +98,7 @@ impl Plan {
     #[must_use]
     pub fn columns(&self, tables: &[Table]) -> Vec<(Role, usize, usize, String, &str)> {
         let describe = |channel: &Channel| {
-            let Place { file, column } = channel.place;
+            let FileColumn { file, column } = channel.place;
             (channel.role, file, column, tables[file].name(column), self.unit_text(channel))
         };
         self.decision.channels().iter().map(describe).collect()

@@ -25,7 +25,7 @@ type Regressors = SVector<f64, { PARAMETERS - 1 }>;
 type Row = SVector<f64, PARAMETERS>;
 
 /// Regressors of a reference behind a high-pass, on a grid of its own clock.
-pub(super) struct Motion {
+pub(super) struct ReferenceRegressors {
     start_s: f64,
     step_s: f64,
     rows: Vec<Regressors>,
@@ -36,7 +36,7 @@ pub(super) struct Motion {
     slow_s: f64,
 }
 
-impl Motion {
+impl ReferenceRegressors {
     /// Regressors of a reference; the window of the high-pass is `slow` full stretches.
     pub(super) fn new((times, values): (&[f64], &[f64]), slow: f64) -> Option<Self> {
         let (times, values) = known(times, values);
@@ -131,7 +131,7 @@ pub(super) struct Pull {
 }
 
 impl Pull {
-    pub(super) fn new((times, values): (&[f64], &[f64]), motion: &Motion) -> Option<Self> {
+    pub(super) fn new((times, values): (&[f64], &[f64]), motion: &ReferenceRegressors) -> Option<Self> {
         let (times, values) = known(times, values);
         let (start_s, end_s) = (*times.first()?, *times.last()?);
         let step_s = self::step_s(&times)?.max((end_s - start_s) / MOST_MOTION_ROWS);
@@ -151,7 +151,7 @@ impl Pull {
     }
 
     /// The regression at a lag of the reference; `None` if there is too little in common.
-    pub(super) fn fit(&self, motion: &Motion, lag_s: f64) -> Option<Fit> {
+    pub(super) fn fit(&self, motion: &ReferenceRegressors, lag_s: f64) -> Option<Fit> {
         let known = self.rows.iter().filter_map(|(time_s, value)| Some((motion.at(time_s + lag_s)?.push(1.0), *value)));
         let rows: Vec<(Row, f64)> = known.collect();
         if rows.len() < FEWEST {

@@ -1,4 +1,4 @@
-use super::motion::{BLOCKS, Fit, Motion, Pull};
+use super::motion::{BLOCKS, Fit, Pull, ReferenceRegressors};
 use super::{Lag, LagError};
 
 /// Lags tried in the time of one full stretch, at first …
@@ -24,7 +24,7 @@ const EXPLAINED: f64 = 3e-4;
 
 /// Fits at all lags tried.
 pub(super) struct Search {
-    motion: Motion,
+    motion: ReferenceRegressors,
     pull: Pull,
     /// s, increasing.
     lags: Vec<f64>,
@@ -38,7 +38,7 @@ impl Search {
         reference: (&[f64], &[f64]),
         within_s: Option<f64>,
     ) -> Result<Self, LagError> {
-        let motion = Motion::new(reference, SLOW).ok_or(LagError::Short)?;
+        let motion = ReferenceRegressors::new(reference, SLOW).ok_or(LagError::Short)?;
         let pull = Pull::new(readings, &motion).ok_or(LagError::Short)?;
         let coarse_s =
             within_s.map_or(f64::INFINITY, |within| within / COARSE_STEPS).min(motion.stretch_s / COARSE_STEPS);
@@ -100,7 +100,7 @@ impl Search {
         let (lag_s, sd_s, unexplained) = refine(&self.motion, &self.pull, self.lags[i], self.coarse_s);
         let mut squares = sd_s * sd_s;
         for slow in OTHER_SLOW {
-            let motion = Motion::new(reference, slow).ok_or(LagError::Short)?;
+            let motion = ReferenceRegressors::new(reference, slow).ok_or(LagError::Short)?;
             let Some(pull) = Pull::new(readings, &motion) else { continue };
             let (other_s, ..) = refine(&motion, &pull, lag_s, self.coarse_s);
             squares += (other_s - lag_s).powi(2) / OTHER_SLOW.len() as f64;
@@ -132,7 +132,7 @@ impl Search {
 }
 
 /// The lags to try, s.
-fn range(motion: &Motion, pull: &Pull, within_s: Option<f64>) -> Option<(f64, f64)> {
+fn range(motion: &ReferenceRegressors, pull: &Pull, within_s: Option<f64>) -> Option<(f64, f64)> {
     let ((r0, r1), (s0, s1)) = (pull.span(), motion.span());
     let common = LEAST_OVERLAP * (r1 - r0).min(s1 - s0);
     let (first, last) = (s0 - (r1 - common), s1 - (r0 + common));
@@ -142,7 +142,7 @@ fn range(motion: &Motion, pull: &Pull, within_s: Option<f64>) -> Option<(f64, f6
 }
 
 /// The minimum near a lag, what it scatters by when blocks are left out, and what it leaves unexplained.
-fn refine(motion: &Motion, pull: &Pull, about_s: f64, coarse_s: f64) -> (f64, f64, f64) {
+fn refine(motion: &ReferenceRegressors, pull: &Pull, about_s: f64, coarse_s: f64) -> (f64, f64, f64) {
     let step_s = coarse_s / f64::from(FINE_STEPS);
     let lags: Vec<f64> = (-2 * FINE_STEPS..=2 * FINE_STEPS).map(|i| about_s + f64::from(i) * step_s).collect();
     let fits: Vec<Option<Fit>> = lags.iter().map(|lag_s| pull.fit(motion, *lag_s)).collect();

@@ -119,7 +119,7 @@ fn listed(manifest: &Path, args: &BatchArgs, plain: &dyn Fn(PathBuf) -> Job) -> 
     let folder = manifest.parent().unwrap_or(Path::new(""));
     let (mut jobs, mut made): (Vec<Job>, HashMap<PathBuf, usize>) = (Vec::new(), HashMap::new());
     for row in rows.records() {
-        let row = Row { manifest, header: &header, cells: row.map_err(wrong)? };
+        let row = ManifestRow { manifest, header: &header, cells: row.map_err(wrong)? };
         let job = row.job(folder, args, plain)?;
         let is_shared = args.command == BatchCommand::Calibrate && !job.output.as_os_str().is_empty();
         match made.get(&job.output).filter(|_| is_shared) {
@@ -134,13 +134,13 @@ fn listed(manifest: &Path, args: &BatchArgs, plain: &dyn Fn(PathBuf) -> Job) -> 
 }
 
 /// A row of a manifest.
-struct Row<'a> {
+struct ManifestRow<'a> {
     manifest: &'a Path,
     header: &'a StringRecord,
     cells: StringRecord,
 }
 
-impl Row<'_> {
+impl ManifestRow<'_> {
     fn job(&self, folder: &Path, args: &BatchArgs, plain: &dyn Fn(PathBuf) -> Job) -> Result<Job, CliError> {
         let mut job = plain(PathBuf::new());
         for (name, cell) in self.header.iter().map(str::trim).zip(self.cells.iter().map(str::trim)) {

@@ -16,7 +16,7 @@ use crate::commands::{calibrate, filter, smooth};
 use crate::error::CliError;
 use crate::input::sha256_of;
 use crate::messages::Messages;
-use crate::output::{Place, UnfinishedFolder};
+use crate::output::{Destination, UnfinishedFolder};
 use crate::printable::printable;
 use ohmstrain::MADE_BY;
 
@@ -100,7 +100,7 @@ impl<'a> Workshop<'a> {
         journal.note(entry)?;
         if entry.output_sha256.is_some() {
             path.parent().map_or(Ok(()), fs::create_dir_all).map_err(|error| cannot_write(&error))?;
-            Place::of(&path).and_then(|place| place.adopt(&draft)).map_err(|error| cannot_write(&error))?;
+            Destination::of(&path).and_then(|place| place.adopt(&draft)).map_err(|error| cannot_write(&error))?;
         }
         let _ = fs::remove_file(draft);
         Ok(())

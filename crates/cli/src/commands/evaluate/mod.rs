@@ -11,7 +11,7 @@ pub use evaluation::Evaluation;
 use ohmstrain_calib::{Baselines, PublishedLaw, Samples, reference_lag, screen};
 use rayon::prelude::*;
 pub use scores::RecordingScores;
-use sensors::{Rivals, Sensor, phases};
+use sensors::{JudgedSensor, Rivals, phases};
 use told::Told;
 
 use crate::args::{EvaluateArgs, Split};
@@ -75,7 +75,7 @@ fn with_sensor_file(
     evaluation: &mut Evaluation,
     messages: &Messages,
 ) -> Result<(), CliError> {
-    let sensors = Sensor::from_file(path, args.estimator, args.with_correction())?;
+    let sensors = JudgedSensor::from_file(path, args.estimator, args.with_correction())?;
     let rivals = Rivals { static_cubic: sensors[0].sensor.params().static_cubic, learned: None, published: None };
     let judged = |path: &PathBuf| judge(args, &read(args, path)?, Part::since(args.from), &sensors, &rivals);
     add_until_error(evaluation, args.traces.par_iter().map(judged).collect(), messages)
@@ -174,8 +174,8 @@ fn calibrated(
     training: &[TraceFile],
     args: &EvaluateArgs,
     progress: &Progress,
-) -> Result<(Vec<Sensor>, Rivals), CliError> {
-    let sensors = Sensor::calibrated(training, args.estimator, args.with_correction(), progress)?;
+) -> Result<(Vec<JudgedSensor>, Rivals), CliError> {
+    let sensors = JudgedSensor::calibrated(training, args.estimator, args.with_correction(), progress)?;
     let samples: Vec<Samples> = training.iter().map(TraceFile::samples).collect::<Result<_, _>>()?;
     let names: Vec<&str> = training.iter().map(|recording| recording.name.as_str()).collect();
     let failed = |error| CliError::calibration(&names, &error);
@@ -199,11 +199,11 @@ fn judge(
     args: &EvaluateArgs,
     recording: &TraceFile,
     part: Part,
-    sensors: &[Sensor],
+    sensors: &[JudgedSensor],
     rivals: &Rivals,
 ) -> Result<Judged, CliError> {
     let mut judged = Judged::default();
-    let Some(Sensor { sensor: first, kind, .. }) = sensors.first() else { return Ok(judged) };
+    let Some(JudgedSensor { sensor: first, kind, .. }) = sensors.first() else { return Ok(judged) };
     check_unit(&recording.header, recording.trace.readings.kind, first.params().reading)?;
     recording.samples()?;
     recording.check_quantity(first.params().quantity)?;

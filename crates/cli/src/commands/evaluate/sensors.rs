@@ -20,7 +20,7 @@ use crate::sensor_file;
 use ohmstrain_report::Sample;
 
 /// A calibrated sensor and the estimator that it is judged with.
-pub struct Sensor {
+pub struct JudgedSensor {
     /// The sensor.
     pub sensor: ohmstrain::Sensor,
     /// The estimator.
@@ -47,7 +47,7 @@ pub fn phases(time_s: &[f64], strain: &[f64]) -> Vec<PhaseRows> {
     segment(time_s, strain).into_iter().map(|segment| (segment.phase, segment.rows)).collect()
 }
 
-impl Sensor {
+impl JudgedSensor {
     /// Reads a sensor for each requested estimator, with the parameters of a file; at least one.
     pub fn from_file(path: &Path, estimators: Estimators, corrects: bool) -> Result<Vec<Self>, CliError> {
         let wanted = if let Estimators::One(kind) = estimators { Some(kind) } else { None };

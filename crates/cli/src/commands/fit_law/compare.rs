@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::rows::{Cell, Rows};
+use super::rows::{Cell, LawTable};
 use super::{Fits, Fitted, fit_recording, output};
 use crate::args::FitLawArgs;
 use crate::error::CliError;
@@ -57,7 +57,7 @@ pub fn compare(recordings: &[TraceFile], args: &FitLawArgs, messages: &Messages)
     }
 }
 
-fn table(ranked: &[Ranked]) -> Rows {
+fn table(ranked: &[Ranked]) -> LawTable {
     let unit = ranked.first().map(|first| first.unit);
     let unit = unit.filter(|unit| *unit != "1" && ranked.iter().all(|one| one.unit == *unit));
     let left = unit.map_or("residual sd".to_owned(), |unit| format!("residual sd, {unit}"));
@@ -76,7 +76,7 @@ fn table(ranked: &[Ranked]) -> Rows {
             number(one.residual_autocorrelation, 2),
         ]
     };
-    Rows { keys: 3, header: header.map(String::from).to_vec(), rows: ranked.iter().map(row).collect() }
+    LawTable { keys: 3, header: header.map(String::from).to_vec(), rows: ranked.iter().map(row).collect() }
 }
 
 fn rank(tried: &[(String, Fits)]) -> Result<Vec<Ranked>, CliError> {

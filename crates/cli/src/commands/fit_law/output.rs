@@ -3,7 +3,7 @@ use std::collections::BTreeSet;
 use ohmstrain_calib::closed_form::{Estimated, ModulusShape};
 use serde::Serialize;
 
-use super::rows::{Cell, Rows};
+use super::rows::{Cell, LawTable};
 use super::{Fits, Fitted, phase_of};
 use crate::args::FitLawArgs;
 use crate::error::CliError;
@@ -94,7 +94,7 @@ fn fit_report<'a>(recording: &'a Fits, Fitted { piece, fit }: &'a Fitted, args: 
 }
 
 /// One row per fit.
-pub fn table(recordings: &[Fits]) -> Rows {
+pub fn table(recordings: &[Fits]) -> LawTable {
     let fits = || recordings.iter().flat_map(|recording| recording.fits.iter().map(move |fitted| (recording, fitted)));
     let names = names(fits().map(|(_, fitted)| fitted));
     let header = ["recording", "segment", "speed, 1/s"].map(String::from).into_iter();
@@ -113,7 +113,7 @@ pub fn table(recordings: &[Fits]) -> Rows {
         row
     };
     let rows = fits().map(row).collect();
-    Rows { keys: 2, header, rows }
+    LawTable { keys: 2, header, rows }
 }
 
 /// Names of all parameters and derived quantities, each once.

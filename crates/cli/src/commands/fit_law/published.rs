@@ -1,7 +1,7 @@
 use ohmstrain_calib::closed_form::{ClosedForm, Datum, Estimated};
 use ohmstrain_model::Phase;
 
-use super::rows::{Cell, Rows};
+use super::rows::{Cell, LawTable};
 use super::{Fits, Fitted, SAME_SPEED, output};
 use crate::messages::Messages;
 use ohmstrain::number::{fixed, plain};
@@ -19,7 +19,7 @@ struct Entry<'a> {
 const PHASES: [&str; 5] = ["extend", "hold", "retract", "rest", "whole"];
 
 /// One row per material, speed and phase.
-pub fn table(recordings: &[Fits]) -> Rows {
+pub fn table(recordings: &[Fits]) -> LawTable {
     let in_mm = recordings.iter().all(|recording| recording.gauge_length_mm.is_some());
     let mut entries: Vec<Entry> = recordings.iter().flat_map(|recording| entries(recording, in_mm)).collect();
     let order = |entry: &Entry| PHASES.iter().position(|phase| *phase == entry.phase);
@@ -37,7 +37,7 @@ pub fn table(recordings: &[Fits]) -> Rows {
             rows.push(row(phase, &names));
         }
     }
-    Rows { keys: 3, header, rows }
+    LawTable { keys: 3, header, rows }
 }
 
 /// Warns of a phase that a law does not describe, though it describes both of its phases together.

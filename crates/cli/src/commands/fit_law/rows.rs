@@ -63,14 +63,14 @@ impl From<String> for Cell {
 }
 
 /// A table.
-pub struct Rows {
+pub struct LawTable {
     /// Number of leading columns that identify a row.
     pub keys: usize,
     pub header: Vec<String>,
     pub rows: Vec<Vec<Cell>>,
 }
 
-impl Rows {
+impl LawTable {
     /// Prints it.
     pub fn print(&self, format: TableFormat) -> Result<(), CliError> {
         match format {
@@ -200,7 +200,7 @@ fn escaped(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{Cell, Rows};
+    use super::{Cell, LawTable};
 
     #[test]
     fn numbers_keep_their_digits_in_csv_and_their_signs_in_latex() {
@@ -210,7 +210,7 @@ mod tests {
             vec![Cell::from("c_1".to_string()), Cell::NotTold],
             vec![Cell::from("d".to_string()), Cell::Number(-1.5e-7, "−1.5·10⁻⁷".into())],
         ];
-        let table = Rows { keys: 1, header, rows };
+        let table = LawTable { keys: 1, header, rows };
         let csv = table.csv();
         let lines: Vec<&str> = csv.lines().collect();
         assert_eq!(lines[0], "segment,\"tau_0, s\",\"standard error of tau_0, s\"");

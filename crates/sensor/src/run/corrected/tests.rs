@@ -20,6 +20,7 @@ use crate::params::law::{GaugeParams, LawParams};
 use crate::params::range::RangeParams;
 use crate::run::build::FilterParts;
 use crate::run::options::Options;
+use crate::run::turns::Turns;
 use crate::run::{Filter, Output, Rows, SEGMENT, WayBack};
 
 const LIMITS: RangeParams = RangeParams { lower: 0.0, upper: 0.4 };
@@ -48,9 +49,13 @@ fn says(time_s: f64, gap: f64, verdict: ReadingVerdict) -> Output {
     }
 }
 
-struct FakeBack(Vec<Output>);
+struct FakeBack(Vec<Output>, Turns);
 
 impl WayBack for FakeBack {
+    fn turns(&self) -> &Turns {
+        &self.1
+    }
+
     fn next_segment(&mut self, out: &mut Vec<Output>) -> Result<Option<Range<usize>>, (usize, StepError)> {
         let rows = (self.0.len().saturating_sub(1) / SEGMENT * SEGMENT)..self.0.len();
         *out = self.0.split_off(rows.start);
@@ -67,10 +72,10 @@ fn reading(time_s: f64) -> Reading<f64> {
 }
 
 /// Features of the readings up to a row.
-type Seen = Option<[f64; FEATURES]>;
+type CorrectionReading = Option<[f64; FEATURES]>;
 
 /// Features of the past, or of the future of times in falling order.
-fn features(time_s: &[f64], readings: &[Option<Reading<f64>>], scale: FeatureScale<f64>) -> Vec<Seen> {
+fn features(time_s: &[f64], readings: &[Option<Reading<f64>>], scale: FeatureScale<f64>) -> Vec<CorrectionReading> {
     let mut features = ReadingFeatures::new(scale);
     let mut before_s = time_s[0];
     let mut step = |time_s: f64, reading: Option<Reading<f64>>| {
@@ -81,7 +86,7 @@ fn features(time_s: &[f64], readings: &[Option<Reading<f64>>], scale: FeatureSca
     time_s.iter().zip(readings).map(|(time_s, reading)| step(*time_s, *reading)).collect()
 }
 
-fn both_ways(time_s: &[f64], readings: &[Option<Reading<f64>>]) -> (Vec<Seen>, Vec<Seen>) {
+fn both_ways(time_s: &[f64], readings: &[Option<Reading<f64>>]) -> (Vec<CorrectionReading>, Vec<CorrectionReading>) {
     let back: (Vec<f64>, Vec<Option<Reading<f64>>>) =
         (time_s.iter().rev().copied().collect(), readings.iter().rev().copied().collect());
     let mut future = features(&back.0, &back.1, SCALE.future());
@@ -101,7 +106,7 @@ fn params() -> CorrectionParams {
         filtered: outputs(&says(time_s[k], 0.0, ReadingVerdict::Accepted)),
         smoothed: outputs(&says(time_s[k], 0.0, ReadingVerdict::Accepted)),
     };
-    // Weights that nobody has learned: what is said of a row is a smooth function of all its inputs.
+    // Weights that nobody has learned: what is bare_row of a row is a smooth function of all its inputs.
     let weights = |rows: usize| (0..rows).map(|k| 0.01 * (1.3 * k as f64).sin()).collect();
     let process = |length: f64, inputs: Vec<usize>| ProcessParams {
         sd_scale: 1.2,
@@ -169,7 +174,7 @@ fn segments_say_what_the_whole_recording_says() {
         .collect();
     let row = |k: usize| (time_s[k], readings[k]);
     let learned = Learned::new(&params(), LIMITS);
-    let back = Box::new(FakeBack(plain.clone()));
+    let back = Box::new(FakeBack(plain.clone(), Turns::default()));
     let mut back = CorrectedWayBack::new(back, &learned, Rows::new(time_s.len(), &row));
     let (mut smoothed, mut segment) = (Vec::new(), Vec::new());
     while back.next_segment(&mut segment).unwrap().is_some() {
@@ -178,19 +183,19 @@ fn segments_say_what_the_whole_recording_says() {
     let correction = Arc::clone(&learned.smoother);
     assert_eq!(smoothed.len(), time_s.len());
     for k in 0..time_s.len() {
-        let said = plain[k];
-        let mut expected = said.estimate.strain;
+        let bare_row = plain[k];
+        let mut expected = bare_row.estimate.strain;
         if let Some(past) = past[k] {
             let future = future[k].map_or([0.0; FEATURES - 1], future_features);
-            let inputs = smoother_inputs(&outputs(&said), &past, &future);
+            let inputs = smoother_inputs(&outputs(&bare_row), &past, &future);
             expected = correction.correction().correct(&inputs, expected, 1.0).strain;
             // At readings the filter's variance is 1e-4, whatever the side.
-            expected.variance += said.estimate.strain.variance - 1e-4;
+            expected.variance += bare_row.estimate.strain.variance - 1e-4;
         }
         let strain = smoothed[k].estimate.strain;
         // The low-passes of thousands of rows begin anew from what was kept: to the last bit, but for the growth.
         assert!(strain.mean == expected.mean && (strain.variance - expected.variance).abs() < 1e-15, "{k}");
-        assert_eq!((smoothed[k].nis, smoothed[k].phases), (said.nis, said.phases));
+        assert_eq!((smoothed[k].nis, smoothed[k].phases), (bare_row.nis, bare_row.phases));
     }
 }
 
@@ -254,12 +259,12 @@ fn a_corrected_filter_says_what_the_bare_one_beside_it_and_its_readings_say() {
     for (time_s, reading) in broken_recording() {
         bare.step(time_s, reading).unwrap();
         corrected.step(time_s, reading).unwrap();
-        let said = bare.output();
-        let seen = reading.filter(|_| said.verdict.is_taken());
-        rejected += usize::from(said.verdict == ReadingVerdict::Rejected);
+        let bare_row = bare.output();
+        let seen = reading.filter(|_| bare_row.verdict.is_taken());
+        rejected += usize::from(bare_row.verdict == ReadingVerdict::Rejected);
         let past = features.step(time_s - last_s, seen.map(|reading| reading.value)).or(features.now());
         last_s = time_s;
-        let filtered = said.estimate.strain;
+        let filtered = bare_row.estimate.strain;
         if seen.is_some() {
             known = Some(filtered.variance);
         }
@@ -269,7 +274,7 @@ fn a_corrected_filter_says_what_the_bare_one_beside_it_and_its_readings_say() {
         let fading = |k: usize| (-(last - innovations[k].0) / 20.0).exp();
         let mean: f64 = (1..innovations.len()).map(|k| innovations[k].1.min(30.0) * share(k) * fading(k)).sum();
         let expected = past.map_or(filtered, |past| {
-            let inputs = filter_inputs(&outputs(&said), &past);
+            let inputs = filter_inputs(&outputs(&bare_row), &past);
             let strain = correction.correction().correct(&inputs, filtered, mean.max(1.0)).strain;
             let grown = if seen.is_none() { filtered.variance - known.unwrap() } else { 0.0 };
             Gaussian { variance: strain.variance + grown.max(0.0), ..strain }
@@ -277,9 +282,9 @@ fn a_corrected_filter_says_what_the_bare_one_beside_it_and_its_readings_say() {
         let strain = corrected.strain();
         let off = (strain.mean - expected.mean).abs().max((strain.variance / expected.variance - 1.0).abs());
         assert!(off < 1e-9, "{time_s} s: {strain:?} {expected:?}");
-        let bare_but_strain = Estimate { strain, ..said.estimate };
-        assert_eq!(corrected.output(), Output { estimate: bare_but_strain, ..said });
-        if let (Some(nis), true) = (said.nis, seen.is_some()) {
+        let bare_but_strain = Estimate { strain, ..bare_row.estimate };
+        assert_eq!(corrected.output(), Output { estimate: bare_but_strain, ..bare_row });
+        if let (Some(nis), true) = (bare_row.nis, seen.is_some()) {
             innovations.push((time_s, nis));
         }
     }
@@ -293,12 +298,12 @@ fn a_lagged_row_is_mixed_with_what_was_said_of_it() {
     let learned = Learned::new(&params(), LIMITS);
     let [mut now, mut lagging] = [0; 2].map(|_| live(Some(&learned), None));
     let mut bare = live(None, None);
-    let (mut said, mut out, mut plain) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut bare_row, mut out, mut plain) = (Vec::new(), Vec::new(), Vec::new());
     for k in 0..50 {
         let time_s = 0.1 * f64::from(k);
         let reading = Some(reading(time_s));
         now.step(time_s, reading).unwrap();
-        said.push(now.strain());
+        bare_row.push(now.strain());
         lagging.step_lagged(time_s, reading, 0.2, &mut |output| out.push(output)).unwrap();
         bare.step_lagged(time_s, reading, 0.2, &mut |output| plain.push(output)).unwrap();
         if k == 20 {
@@ -310,7 +315,7 @@ fn a_lagged_row_is_mixed_with_what_was_said_of_it() {
     bare.flush_lagged(&mut |output| plain.push(output)).unwrap();
     // The readings are the law's own: innovations are no larger than stated.
     let expected: Vec<Gaussian<f64>> =
-        said.iter().zip(&plain).map(|(said, plain)| mixture([*said, plain.estimate.strain])).collect();
+        bare_row.iter().zip(&plain).map(|(bare_row, plain)| mixture([*bare_row, plain.estimate.strain])).collect();
     assert_eq!(out.iter().map(|output| output.estimate.strain).collect::<Vec<_>>(), expected);
 }
 

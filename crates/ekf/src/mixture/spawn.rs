@@ -8,8 +8,8 @@ use crate::Real;
 use crate::kernel::{Course, Lanes, MOST_LANES, Parts, Several, Work, refusal};
 use crate::mixture::Added;
 use crate::mixture::children::Children;
-use crate::mixture::evidence::{Heard, Weighing};
-use crate::mixture::lineage::{Birth, Recorder};
+use crate::mixture::evidence::{UpdatedChildren, Weighing};
+use crate::mixture::lineage::{ChildRecord, Recorder};
 use crate::mixture::predicted::Predicted;
 use crate::mixture::state::{Mixture, Share};
 use crate::{Compact, MixtureResidual, Reading, Residual, StepError, Switch};
@@ -30,42 +30,42 @@ pub(crate) struct Parents<V: Lanes> {
 }
 
 /// Recorder of children on their way to the reading.
-pub(crate) trait Trail<V: Lanes, const B: usize> {
+pub(crate) trait ChildTrace<V: Lanes, const B: usize> {
     /// Records the starts: the parents' beliefs, with a new rate where a phase `begins`.
     fn starts(&mut self, _from: &Parts<V, B>, _begins: V::Mask, _course: &Course<V>) {}
     /// The prediction before it is cut.
     fn ahead(&mut self, _predicted: &Parts<V, B>) {}
 }
 
-/// Trail that records nothing.
-impl<V: Lanes, const B: usize> Trail<V, B> for () {}
+/// Trace that records nothing.
+impl<V: Lanes, const B: usize> ChildTrace<V, B> for () {}
 
 /// Data of a child that a recorder receives.
-struct Seen<T, const B: usize> {
+struct ChildPath<T, const B: usize> {
     from: Parts<T, B>,
     begins: bool,
     course: Course<T>,
     predicted: Parts<T, B>,
 }
 
-impl<T: Real, const B: usize> Trail<T, B> for Option<Seen<T, B>> {
+impl<T: Real, const B: usize> ChildTrace<T, B> for Option<ChildPath<T, B>> {
     #[inline(always)]
     fn starts(&mut self, from: &Parts<T, B>, begins: bool, course: &Course<T>) {
-        if let Some(seen) = self {
-            (seen.from, seen.begins, seen.course) = (*from, begins, *course);
+        if let Some(path) = self {
+            (path.from, path.begins, path.course) = (*from, begins, *course);
         }
     }
 
     #[inline(always)]
     fn ahead(&mut self, predicted: &Parts<T, B>) {
-        if let Some(seen) = self {
-            seen.predicted = *predicted;
+        if let Some(path) = self {
+            path.predicted = *predicted;
         }
     }
 }
 
 /// A filter whose hypotheses have a child in each phase at most.
-pub(crate) trait Breeds<T: Real, const B: usize, const N: usize> {
+pub(crate) trait Spawns<T: Real, const B: usize, const N: usize> {
     /// Switch that splits uncertain rates, and takes roots, where numbers are stepped one by one.
     type Switch: Switch<T>;
 
@@ -84,18 +84,18 @@ pub(crate) trait Breeds<T: Real, const B: usize, const N: usize> {
     ) -> Turning<V>;
 
     /// Makes the children of one phase of their parents' beliefs; `None` if there are none.
-    fn brood<V: Several<Number = T>, X: Switch<V>>(
+    fn spawn<V: Several<Number = T>, X: Switch<V>>(
         &self,
         parts: &mut Parts<V, B>,
         parents: &Parents<V>,
         phase: Phase,
         reading: Option<Reading<V>>,
-        trail: &mut impl Trail<V, B>,
-    ) -> Option<Heard<V>>;
+        trace: &mut impl ChildTrace<V, B>,
+    ) -> Option<UpdatedChildren<V>>;
 }
 
 /// One step of a filter.
-pub(crate) struct Breeding<'a, F, T, const B: usize, const N: usize, const L: usize, const K: usize> {
+pub(crate) struct MixtureStep<'a, F, T, const B: usize, const N: usize, const L: usize, const K: usize> {
     pub filter: &'a F,
     pub state: &'a Mixture<T, N, L, K>,
     pub reading: Option<Reading<T>>,
@@ -106,27 +106,28 @@ pub(crate) struct Breeding<'a, F, T, const B: usize, const N: usize, const L: us
     pub branches: PhantomData<[T; B]>,
 }
 
-type Said<T> = Result<Option<MixtureResidual<T>>, StepError>;
+type StepResult<T> = Result<Option<MixtureResidual<T>>, StepError>;
 
-impl<F: Breeds<T, B, N>, T: Real, const B: usize, const N: usize, const L: usize, const K: usize>
-    Breeding<'_, F, T, B, N, L, K>
+impl<F: Spawns<T, B, N>, T: Real, const B: usize, const N: usize, const L: usize, const K: usize>
+    MixtureStep<'_, F, T, B, N, L, K>
 {
     /// Computes the step in vectors if there are any, unless a recorder follows each child, or directions stay open.
     #[inline(always)]
-    pub(crate) fn done(self, recorder: &mut impl Recorder<T, B>) -> Said<T> {
+    pub(crate) fn done(self, recorder: &mut impl Recorder<T, B>) -> StepResult<T> {
         let Self { filter, state, reading, next, open, branches } = self;
-        if !hears(recorder) && !open {
+        if !records(recorder) && !open {
             // What vectors refuse is looked at number by number, which tells why.
-            if let Some(Ok(said)) = T::in_vectors(Breeding { filter, state, reading, next: &mut *next, open, branches })
+            if let Some(Ok(residual)) =
+                T::in_vectors(MixtureStep { filter, state, reading, next: &mut *next, open, branches })
             {
-                return Ok(said);
+                return Ok(residual);
             }
         }
-        Breeding { filter, state, reading, next, open, branches }.one_by_one(recorder)
+        MixtureStep { filter, state, reading, next, open, branches }.one_by_one(recorder)
     }
 
     #[inline(always)]
-    fn one_by_one<R: Recorder<T, B>>(self, recorder: &mut R) -> Said<T> {
+    fn one_by_one<R: Recorder<T, B>>(self, recorder: &mut R) -> StepResult<T> {
         let Self { filter, state, reading, next, open, .. } = self;
         let (mut children, mut predicted) = (Children::new(next, state.room()), Predicted::new());
         for (place, (share, from)) in state.shares().iter().zip(state.phases()).enumerate() {
@@ -147,23 +148,27 @@ impl<F: Breeds<T, B, N>, T: Real, const B: usize, const N: usize, const L: usize
                     continue;
                 }
                 let mut child = Parts::of(&share.belief);
-                let mut seen = hears(recorder).then_some(Seen {
+                let mut path = records(recorder).then_some(ChildPath {
                     from: child,
                     begins: false,
                     course: Course::Uncertain,
                     predicted: child,
                 });
-                let Some(heard) = filter.brood::<T, F::Switch>(&mut child, &parents, phase, reading, &mut seen) else {
+                let Some(updated) = filter.spawn::<T, F::Switch>(&mut child, &parents, phase, reading, &mut path)
+                else {
                     continue;
                 };
-                if !heard.sound {
-                    return Err(reading.map_or(StepError::NonFiniteState, |reading| refusal(reading, &heard.residual)));
+                if !updated.sound {
+                    return Err(
+                        reading.map_or(StepError::NonFiniteState, |reading| refusal(reading, &updated.residual))
+                    );
                 }
-                let added = collect(&mut children, &mut predicted, (&child, &heard), (0, phase), reading.is_some());
-                if let Some(Seen { from, begins, course, predicted }) = &seen {
-                    let (posterior, weighed, course, begins) = (&child, &heard.weighed, *course, *begins);
-                    let birth = Birth { parent: place, phase, from, begins, course, predicted, posterior, weighed };
-                    recorder.born(&birth, added);
+                let added = collect(&mut children, &mut predicted, (&child, &updated), (0, phase), reading.is_some());
+                if let Some(ChildPath { from, begins, course, predicted }) = &path {
+                    let (posterior, weighed, course, begins) = (&child, &updated.weighed, *course, *begins);
+                    let record =
+                        ChildRecord { parent: place, phase, from, begins, course, predicted, posterior, weighed };
+                    recorder.record(&record, added);
                 }
             }
         }
@@ -173,17 +178,17 @@ impl<F: Breeds<T, B, N>, T: Real, const B: usize, const N: usize, const L: usize
     }
 }
 
-fn hears<T: Real, R: Recorder<T, B>, const B: usize>(_: &R) -> bool {
-    R::LISTENS
+fn records<T: Real, R: Recorder<T, B>, const B: usize>(_: &R) -> bool {
+    R::RECORDS
 }
 
-impl<F: Breeds<T, B, N>, T: Real, const B: usize, const N: usize, const L: usize, const K: usize> Work<T>
-    for Breeding<'_, F, T, B, N, L, K>
+impl<F: Spawns<T, B, N>, T: Real, const B: usize, const N: usize, const L: usize, const K: usize> Work<T>
+    for MixtureStep<'_, F, T, B, N, L, K>
 {
-    type Said = Said<T>;
+    type Output = StepResult<T>;
 
     #[inline(always)]
-    fn with_lanes<V: Several<Number = T>>(self, like: V) -> Said<T> {
+    fn with_lanes<V: Several<Number = T>>(self, like: V) -> StepResult<T> {
         let Self { filter, state, reading, next, .. } = self;
         let in_lanes = reading.map(|Reading { value, extra_variance }| Reading {
             value: like.with(value),
@@ -201,20 +206,20 @@ impl<F: Breeds<T, B, N>, T: Real, const B: usize, const N: usize, const L: usize
             let start = Parts::gathered(like, |lane| &of[lane].0.belief);
             let parents = side_by_side(filter, &start, &of, (there, state.pause().open));
             let [mut extend, mut hold, mut retract] = [start; 3];
-            let broods = [
-                filter.brood::<V, Compact>(&mut extend, &parents, Phase::Extend, in_lanes, &mut ()),
-                filter.brood::<V, Compact>(&mut hold, &parents, Phase::Hold, in_lanes, &mut ()),
-                filter.brood::<V, Compact>(&mut retract, &parents, Phase::Retract, in_lanes, &mut ()),
+            let spawned = [
+                filter.spawn::<V, Compact>(&mut extend, &parents, Phase::Extend, in_lanes, &mut ()),
+                filter.spawn::<V, Compact>(&mut hold, &parents, Phase::Hold, in_lanes, &mut ()),
+                filter.spawn::<V, Compact>(&mut retract, &parents, Phase::Retract, in_lanes, &mut ()),
             ];
-            if broods.iter().flatten().any(|heard| !V::none(V::without(heard.alive, heard.sound))) {
+            if spawned.iter().flatten().any(|updated| !V::none(V::without(updated.alive, updated.sound))) {
                 return Err(StepError::NonFiniteState);
             }
             for lane in 0..V::WIDTH {
-                for ((phase, parts), heard) in Phase::ALL.into_iter().zip([&extend, &hold, &retract]).zip(&broods) {
-                    if let Some(heard) = heard
-                        && V::holds(heard.alive, lane)
+                for ((phase, parts), updated) in Phase::ALL.into_iter().zip([&extend, &hold, &retract]).zip(&spawned) {
+                    if let Some(updated) = updated
+                        && V::holds(updated.alive, lane)
                     {
-                        collect(&mut children, &mut predicted, (parts, heard), (lane, phase), reading.is_some());
+                        collect(&mut children, &mut predicted, (parts, updated), (lane, phase), reading.is_some());
                     }
                 }
             }
@@ -236,7 +241,7 @@ fn side_by_side<F, V, const B: usize, const N: usize, const L: usize>(
 ) -> Parents<V>
 where
     V: Several<Number: Real>,
-    F: Breeds<V::Number, B, N>,
+    F: Spawns<V::Number, B, N>,
 {
     let [weight, per_inside, extend, hold, retract] = beliefs.strain.build(|lane| {
         let (share, from) = of[lane];
@@ -254,7 +259,7 @@ where
 fn collect<V, const B: usize, const N: usize, const L: usize, const K: usize>(
     children: &mut Children<'_, V::Number, N, L, K>,
     predicted: &mut Predicted<V::Number>,
-    (parts, heard): (&Parts<V, B>, &Heard<V>),
+    (parts, updated): (&Parts<V, B>, &UpdatedChildren<V>),
     (lane, phase): (usize, Phase),
     compared: bool,
 ) -> Added
@@ -262,8 +267,8 @@ where
     V: Several<Number: Real>,
 {
     if compared {
-        let Residual { innovation, variance, .. } = &heard.residual;
-        predicted.add(heard.prior.at(lane), innovation.at(lane), variance.at(lane));
+        let Residual { innovation, variance, .. } = &updated.residual;
+        predicted.add(updated.prior.at(lane), innovation.at(lane), variance.at(lane));
     }
-    children.add(parts, lane, phase, &heard.weighed.in_lane(lane))
+    children.add(parts, lane, phase, &updated.weighed.in_lane(lane))
 }

@@ -1,0 +1,13 @@
+//! Dense matrices of a calibration: products and factors in vectors of four lanes, with the same digits on every processor.
+//!
+//! nalgebra's loops over matrices of variable size are scalar, and its product of large ones fuses multiplication and addition where
+//! the processor can.
+
+mod cholesky;
+mod gram;
+mod product;
+mod tile;
+
+pub(crate) use cholesky::{cholesky, inverse_diagonal, lower_inverse};
+pub(crate) use gram::gram;
+pub(crate) use product::product;

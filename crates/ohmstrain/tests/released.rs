@@ -1,0 +1,61 @@
+//! Sensors of released versions are read for good, and say what they said.
+
+#![cfg(feature = "calibrate")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use ohmstrain::{Error, Estimate, Sensor, TextCause};
+
+/// Folders that `scripts/released.sh` has written. That of 0.1.0, whose files had no weights of the correction, has estimates of three rows.
+fn released() -> Vec<PathBuf> {
+    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/released");
+    let mut folders: Vec<PathBuf> = fs::read_dir(root).unwrap().map(|folder| folder.unwrap().path()).collect();
+    folders.sort();
+    folders
+}
+
+/// Numbers of a CSV file, row by row.
+fn rows(file: &Path) -> Vec<Vec<f64>> {
+    let text = fs::read_to_string(file).unwrap();
+    text.lines().skip(1).map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect()).collect()
+}
+
+/// Weights of 0.1.0 are learned anew, and those of 0.2.0 are kept with nine digits; weights of 200 rows, some of which are alike, are a
+/// thousand times as large as what they say.
+const TOLERANCE: f64 = 1e-6;
+
+#[test]
+fn a_released_sensor_says_what_it_said() {
+    assert!(released().len() >= 2);
+    for folder in released() {
+        let sensor = Sensor::from_toml(&fs::read_to_string(folder.join("sensor.toml")).unwrap()).unwrap();
+        let readings = rows(&folder.join("readings.csv"));
+        let (time_s, ohm): (Vec<f64>, Vec<f64>) = readings.iter().map(|row| (row[0], row[1])).unzip();
+        let mut filter = sensor.filter().build().unwrap();
+        let filtered: Vec<Estimate> = readings.iter().map(|row| filter.step(row[0], row[1]).unwrap()).collect();
+        let smoothed = sensor.smooth(&time_s, &ohm).unwrap();
+        for (said, file) in [(&filtered, "filter.csv"), (&smoothed, "smooth.csv")] {
+            for row in rows(&folder.join(file)) {
+                let estimate = &said[time_s.iter().position(|time_s| *time_s == row[0]).unwrap()];
+                let (apart, wider) = (estimate.strain - row[1], estimate.strain_sd - row[2]);
+                assert!(apart.abs() < TOLERANCE && wider.abs() < TOLERANCE, "{folder:?} {row:?}: {apart} {wider}");
+            }
+        }
+        let written = sensor.to_toml().unwrap();
+        assert!(written.starts_with("format = 9\n"));
+        assert_eq!(Sensor::from_toml(&written).unwrap(), sensor);
+    }
+}
+
+/// Errors in an old file are reported like those in a new one, and a version older still is refused.
+#[test]
+fn what_is_wrong_with_an_old_file_is_named() {
+    let old = fs::read_to_string(released()[0].join("sensor.toml")).unwrap();
+    let named = |text: &str| Sensor::from_toml(text).unwrap_err().in_file("s.toml");
+    let negative = old.replacen("\nrest_reading = ", "\nrest_reading = -", 1);
+    assert!(named(&negative).starts_with("s.toml:5: column 16: field `rest_reading`: expected 1e-12 to 1e12"));
+    assert!(named("format = 8\n").contains("missing field `made_by`"));
+    let Err(Error::Text(error)) = Sensor::from_toml("format = 7\n") else { panic!("format 7 is refused") };
+    assert!(matches!(error.cause, TextCause::Format { expected: 9, found: 7 }));
+}
