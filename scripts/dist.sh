@@ -4,7 +4,8 @@
 #   dist.sh [--target TRIPLE]    another target's binary must run here, for the pages
 #
 # Environment:
-#   BUILD  cargo's command that builds it; default: build. zigbuild brings a C compiler for targets with another C library
+#   BUILD           cargo's command that builds it; default: build. zigbuild brings a C compiler for targets with another C library
+#   OHMSTRAIN_PAGE  the page that `ohmstrain serve` shows; default: web/dist/index.html, made by web.sh if need be; empty: none
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -16,6 +17,10 @@ case "${1:-}" in
     ;;
 esac
 target=${2:-$(rustc -vV | sed -n 's/^host: //p')}
+if [[ -z ${OHMSTRAIN_PAGE+set} ]]; then
+    export OHMSTRAIN_PAGE=$PWD/web/dist/index.html
+    [[ -f $OHMSTRAIN_PAGE ]] || scripts/web.sh >&2
+fi
 OHMSTRAIN_COMMIT=$(git rev-parse HEAD 2>/dev/null || true) \
     cargo "${BUILD:-build}" --locked --profile dist -p ohmstrain-cli --target "$target"
 binary=${CARGO_TARGET_DIR:-target}/$target/dist/ohmstrain

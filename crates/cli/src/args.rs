@@ -12,6 +12,7 @@ mod live;
 mod plan;
 mod refine;
 mod serial_check;
+mod serve;
 mod shell;
 mod simulate;
 mod split;
@@ -33,6 +34,7 @@ pub use live::LiveArgs;
 pub use plan::PlanArgs;
 pub use refine::RefineArgs;
 pub use serial_check::SerialCheckArgs;
+pub use serve::ServeArgs;
 pub use shell::{CompletionsArgs, ManArgs};
 pub use simulate::{DemoArgs, DemoMaterial, ExampleArgs, SimulateArgs};
 pub use split::Split;
@@ -90,6 +92,9 @@ pub enum Command {
         after_help = "Then: ohmstrain calibrate trace.csv --until 200 -o sensor.toml\n      ohmstrain smooth trace.csv --sensor sensor.toml -o strain.csv"
     )]
     Example(ExampleArgs),
+    /// Show the page for a browser, from this computer to this computer
+    #[command(before_help = "Example: ohmstrain serve")]
+    Serve(ServeArgs),
     /// Say what stands in a lab's files, and how to import them
     #[command(before_help = "Example: ohmstrain inspect rig.csv --gauge-length-mm 40")]
     Inspect(InspectArgs),

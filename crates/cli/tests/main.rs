@@ -39,6 +39,7 @@ mod resumed;
 mod rows_out;
 mod sensor_numbers;
 mod serial_check;
+mod serve;
 mod streaming;
 mod suits;
 mod validity;

@@ -2,9 +2,10 @@
 
 use crate::common::{Bench, SIMULATE, files_in};
 
-const COMMANDS: [&str; 20] = [
+const COMMANDS: [&str; 21] = [
     "demo",
     "example",
+    "serve",
     "inspect",
     "import",
     "plan",

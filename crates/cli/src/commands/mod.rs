@@ -22,6 +22,7 @@ mod reporting;
 mod score_table;
 mod scoring;
 mod serial_check;
+mod serve;
 mod shell;
 mod simulate;
 mod smooth;
@@ -35,6 +36,7 @@ pub fn dispatch(command: &Command, messages: &Messages) -> Result<(), CliError> 
     match command {
         Command::Demo(args) => demo::run(args, messages),
         Command::Example(args) => simulate::example(args),
+        Command::Serve(args) => serve::run(args, messages),
         Command::Inspect(args) => inspect::run(args),
         Command::Import(args) => import::run(args, messages),
         Command::Simulate(args) => simulate::run(args),
