@@ -93,7 +93,7 @@ pub enum Command {
     )]
     Example(ExampleArgs),
     /// Show the page for a browser, from this computer to this computer
-    #[command(before_help = "Example: ohmstrain serve")]
+    #[command(before_help = "Example: ohmstrain serve --port 8476")]
     Serve(ServeArgs),
     /// Say what stands in a lab's files, and how to import them
     #[command(before_help = "Example: ohmstrain inspect rig.csv --gauge-length-mm 40")]
