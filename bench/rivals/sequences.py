@@ -11,7 +11,7 @@ SEEDS = 3
 # Of the recordings that are learned from: as many steps in half of one.
 STEPS = 600
 WINDOW = 160
-UPDATES = 400
+UPDATES = 250
 BATCH = 8
 
 
@@ -55,16 +55,16 @@ class Scaled:
 
 
 class Sequence:
-    """Several models, each of which leaves another recording or quarter out, averaged."""
+    """Several models, averaged. Each is judged without another recording or quarter, and then learns from all."""
 
     def fit_with_deviation(self, parts):
         """Fits, and returns the root mean square error on what was left out."""
         self.scaled = Scaled(parts, stride(parts))
         self.models, errors = [], []
         for seed, (learned, left) in enumerate(folds(parts)[:SEEDS]):
-            model = self.fitted(learned, left, seed)
-            self.models.append(model)
+            model, effort = self.judged(learned, left, seed)
             errors.append((self.run(model, left.recording) - left.recording.truth)[left.learns])
+            self.models.append(self.fitted(parts, seed, effort))
         return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
 
     def predict(self, recording):
@@ -84,28 +84,36 @@ class Recurrent(Sequence):
         output = keras.layers.Add()([keras.layers.Dense(1)(hidden), keras.layers.Dense(1)(inputs)])
         net = keras.Model(inputs, output)
         rate = keras.optimizers.schedules.CosineDecay(6e-3, UPDATES, alpha=2e-3)
-        net.compile(keras.optimizers.AdamW(rate, weight_decay=1e-3, clipnorm=1.0), "mse")
+        net.compile(keras.optimizers.AdamW(rate, weight_decay=1e-3, global_clipnorm=1.0), "mse")
         return net
 
-    def fitted(self, learned, left, seed):
+    def judged(self, learned, left, seed):
+        """The net that is best on what is left out, and how many updates it took."""
+        error = lambda net: np.mean((self.run(net, left.recording) - left.recording.truth)[left.learns] ** 2)
+        best = (np.inf, None, 0)
+        for net, update in self.updates(learned, seed, UPDATES):
+            if update % 25 == 0 and (found := error(net)) < best[0]:
+                best = (found, net.get_weights(), update)
+        net.set_weights(best[1])
+        return net, best[2]
+
+    def fitted(self, parts, seed, updates):
+        for net, _ in self.updates(parts, seed, updates):
+            pass
+        return net
+
+    def updates(self, parts, seed, count):
+        """A net after each of its updates."""
         keras.utils.set_random_seed(seed)
         random = np.random.default_rng(seed)
         net = self.net()
-        sequences = [self.targets(part) for part in learned]
-        # Each step sees windows from anywhere; a state that knows nothing yet does not count.
-        warm = np.arange(WINDOW)[None, :, None] >= WINDOW // 5
-        best, kept = np.inf, net.get_weights()
-        for update in range(1, UPDATES + 1):
+        sequences = [self.targets(part) for part in parts]
+        for update in range(1, count + 1):
             batch = [self.window(sequences[random.integers(len(sequences))], random) for _ in range(BATCH)]
             inputs, truth, counts = (np.stack(columns) for columns in zip(*batch))
             inputs = inputs + 0.02 * random.standard_normal(inputs.shape).astype(np.float32)
-            net.train_on_batch(inputs, truth[..., None], (counts[..., None] * warm)[..., 0])
-            if update % 25 == 0:
-                error = np.mean(((self.run(net, left.recording) - left.recording.truth)[left.learns]) ** 2)
-                if error < best:
-                    best, kept = error, net.get_weights()
-        net.set_weights(kept)
-        return net
+            net.train_on_batch(inputs, truth[..., None], counts)
+            yield net, update
 
     def targets(self, part):
         scaled = self.scaled
@@ -114,16 +122,19 @@ class Recurrent(Sequence):
 
     @staticmethod
     def window(sequences, random):
-        """A window of one sequence; a shorter one is filled up with rows that do not count."""
+        """A window of one sequence: inputs, truth, and which rows count. Where a recording has begun before the window, a state
+        that knows nothing of that does not count; a shorter one is filled up with rows that do not."""
         which, length = random.integers(len(sequences[0])), len(sequences[0][0])
-        start = random.integers(max(1, length - WINDOW + 1))
-        cut = [column[which, start : start + WINDOW] for column in sequences]
+        start = max(0, random.integers(-WINDOW // 3, max(1, length - WINDOW + 1)))
+        cut = [column[which, start : start + WINDOW].copy() for column in sequences]
+        if start > 0:
+            cut[2][: WINDOW // 5] = 0
         missing = WINDOW - len(cut[0])
         return [np.concatenate([column, np.zeros((missing, *column.shape[1:]), column.dtype)]) for column in cut]
 
     def run(self, net, recording):
         sequences = self.scaled.sequences(self.scaled.inputs(recording))
-        return self.scaled.rows(np.asarray(net(sequences))[..., 0], len(recording.truth))
+        return self.scaled.rows(net.predict_on_batch(sequences)[..., 0], len(recording.truth))
 
 
 class EchoState(Sequence):
@@ -144,9 +155,12 @@ class EchoState(Sequence):
             states.append(np.concatenate([state, inputs], axis=1))
         return np.stack(states, axis=1)
 
-    def fitted(self, learned, left, seed):
+    def judged(self, learned, left, seed):
+        return self.fitted(learned, seed), None
+
+    def fitted(self, parts, seed, effort=None):
         rows, truth = [], []
-        for part in learned:
+        for part in parts:
             counts = self.scaled.sequences(part.learns)
             rows.append(self.states(seed, part.recording)[counts])
             truth.append(self.scaled.sequences(self.scaled.truth(part.recording))[counts])

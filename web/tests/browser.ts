@@ -1,12 +1,14 @@
-/** The page in Chromium, opened from the disk. */
+/** The page in Chromium, opened from the disk unless the program serves it. */
 
+import { once } from "node:events";
 import { existsSync, mkdirSync } from "node:fs";
 import { fileURLToPath } from "node:url";
 import axe from "axe-core";
 import { type Browser, type BrowserContextOptions, type Page, chromium } from "playwright-core";
 import { expect } from "vitest";
+import { started } from "./program";
 
-const PAGE = new URL("../dist/index.html", import.meta.url).href;
+const PAGE = new URL("../dist/index.html", import.meta.url);
 const PICTURES = process.env["OHMSTRAIN_PICTURES"] ?? fileURLToPath(new URL("../dist-pictures/", import.meta.url));
 const NAMES = ["chromium", "chromium-browser", "google-chrome"];
 
@@ -27,8 +29,15 @@ export interface Opened {
   complaints: string[];
 }
 
+/** The page's address, as the program serves it, and what stops it. */
+export async function serve(): Promise<{ address: string; stop: () => void }> {
+  const server = started("--quiet", "serve", fileURLToPath(PAGE), "--port", "0");
+  const [printed] = await once(server.stdout, "data");
+  return { address: String(printed).trim(), stop: () => server.kill() };
+}
+
 /** Opens the page; `before` runs in it before its own scripts. */
-export async function open(browser: Browser, options: BrowserContextOptions = {}, before?: () => void): Promise<Opened> {
+export async function open(browser: Browser, options: BrowserContextOptions = {}, before?: () => void, address = PAGE.href): Promise<Opened> {
   const context = await browser.newContext({ viewport: { width: 1100, height: 900 }, ...options });
   const page = await context.newPage();
   const [requests, complaints]: [string[], string[]] = [[], []];
@@ -36,7 +45,7 @@ export async function open(browser: Browser, options: BrowserContextOptions = {}
   page.on("console", (message) => message.type() === "error" && complaints.push(message.text()));
   page.on("pageerror", (error) => complaints.push(error.message));
   if (before) await page.addInitScript(before);
-  await page.goto(PAGE);
+  await page.goto(address);
   return { page, requests, complaints };
 }
 

@@ -6,7 +6,7 @@ import { dirname } from "node:path";
 import { unzipSync } from "fflate";
 import type { Browser } from "playwright-core";
 import { afterAll, beforeAll, expect, test } from "vitest";
-import { checkAccess, download, drop, launch, lines, open, picture } from "./browser";
+import { checkAccess, download, drop, launch, lines, open, picture, serve } from "./browser";
 import { Folder, nasty, simulated, withoutSeconds } from "./program";
 
 let browser: Browser;
@@ -141,6 +141,19 @@ test("a file that is refused is refused in the words of the command line", async
     await expect.poll(() => page.locator(".error, .question").last().textContent()).toBe(folder.refusal("import", name));
   }
   await checkAccess(page);
+});
+
+test("the program serves the page, and nothing else is asked for", async () => {
+  const { address, stop } = await serve();
+  try {
+    const { page, requests, complaints } = await open(browser, {}, undefined, address);
+    await page.locator("#example").click();
+    await page.locator("#recordings .plot canvas").waitFor();
+    expect(requests.filter((url) => !/^(blob|data):/.test(url))).toEqual([address]);
+    expect(complaints).toEqual([]);
+  } finally {
+    stop();
+  }
 });
 
 test("a calibration can be cancelled, and the page goes on", async () => {

@@ -1,9 +1,10 @@
 /** The command line that the page is compared with, and recordings for both. */
 
-import { execFileSync } from "node:child_process";
+import { type ChildProcessByStdio, execFileSync, spawn } from "node:child_process";
 import { mkdtempSync, readFileSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
+import type { Readable } from "node:stream";
 
 const program = process.env["OHMSTRAIN"];
 if (!program) throw new Error("OHMSTRAIN must name the program that the page is compared with: scripts/web.sh --test does");
@@ -45,6 +46,11 @@ export class Folder {
     }
     throw new Error(`ohmstrain ${args.join(" ")} was expected to fail`);
   }
+}
+
+/** The program while it runs. */
+export function started(...args: string[]): ChildProcessByStdio<null, Readable, null> {
+  return spawn(program as string, args, { stdio: ["ignore", "pipe", "inherit"] });
 }
 
 /** A recording of the simulator, as its text: a thousand rows, enough to calibrate on. */

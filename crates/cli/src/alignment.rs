@@ -1,10 +1,9 @@
 //! References that are early or late.
 
+use ohmstrain::trace::TraceFile;
 use ohmstrain::{Interface, LagAnswer};
-use ohmstrain_calib::aligned;
 
 use crate::error::CliError;
-use crate::input::TraceFile;
 use crate::messages::Messages;
 
 /// Reports the lag of a recording's reference. It moves the reference if `align`, refuses one that certainly lags too much to be used
@@ -18,7 +17,7 @@ pub fn check(recording: &mut TraceFile, align: bool, explain: bool, messages: &M
     match doubt.answer(align, Interface::CommandLine) {
         LagAnswer::Move(lag, text) => {
             messages.warning(&format!("{name}: {text}"));
-            shift(recording, lag.lag_s)?;
+            recording.move_reference(lag.lag_s)?;
             return Ok(lag.lag_s);
         }
         LagAnswer::Refuse(text) => return Err(CliError::Input(format!("{name}: {text}"))),
@@ -27,13 +26,4 @@ pub fn check(recording: &mut TraceFile, align: bool, explain: bool, messages: &M
         LagAnswer::Remark(text) => messages.detail(&format!("{name}: {text}")),
     }
     Ok(0.0)
-}
-
-/// Moves a reference that is late by `lag_s`.
-pub fn shift(recording: &mut TraceFile, lag_s: f64) -> Result<(), CliError> {
-    let moved = aligned(&recording.samples()?, lag_s);
-    if let Some(reference) = &mut recording.trace.reference {
-        reference.values = moved;
-    }
-    Ok(())
 }

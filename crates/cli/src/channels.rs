@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use ohmstrain::ReadingUnit;
+use ohmstrain::trace::{TraceFile, reading_column};
 use ohmstrain_bench_data::{Metadata, ParquetText};
 
 use crate::error::CliError;
-use crate::input::{self, TraceFile, reading_column};
+use crate::input;
 use crate::whole_file;
 
 /// Columns that a recording of one channel has its readings in.

@@ -3,6 +3,7 @@ use std::io;
 use std::path::Path;
 use std::process::ExitCode;
 
+use ohmstrain::trace::TraceFileError;
 use ohmstrain::{Error as LibraryError, Quantity};
 use ohmstrain_bench_data::TraceError;
 use ohmstrain_calib::CalibrationError;
@@ -105,6 +106,12 @@ impl From<LibraryError> for CliError {
             LibraryError::Row { row, source } => Self::Input(format!("data row {}: {source}", row + 1)),
             _ => Self::Input(error.to_string()),
         }
+    }
+}
+
+impl From<TraceFileError> for CliError {
+    fn from(error: TraceFileError) -> Self {
+        Self::Input(error.to_string())
     }
 }
 

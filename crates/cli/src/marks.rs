@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use csv::{Position, Reader, StringRecord};
+use ohmstrain::trace::TraceFile;
 use ohmstrain::{CalibrationError, Error, Mark, MarkedReference, MarksError};
 use ohmstrain_bench_data::{Reference, ReferenceQuantity};
 
 use crate::error::CliError;
-use crate::input::TraceFile;
 use crate::whole_file;
 
 /// Columns of a file of marks, with that of the strain's standard deviation.

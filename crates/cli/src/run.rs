@@ -1,8 +1,8 @@
+use ohmstrain::trace::TraceFile;
 use ohmstrain::{Error, Estimate, EstimatorKind, FilterBuilder, Known, Sensor};
 
 use crate::args::{EstimateArgs, RestResistance, Without};
 use crate::error::CliError;
-use crate::input::TraceFile;
 
 /// A sensor's filter as the flags want it.
 pub fn builder<'a>(sensor: &'a Sensor, args: &'a EstimateArgs) -> FilterBuilder<'a> {

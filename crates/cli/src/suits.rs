@@ -1,10 +1,10 @@
 //! Doubts about what a sensor is given, refused or warned of.
 
 use ohmstrain::Interface::CommandLine;
+use ohmstrain::trace::TraceFile;
 use ohmstrain::{Known, ReferenceDoubt, Sensor, UnitDoubt, unused_known};
 
 use crate::error::CliError;
-use crate::input::TraceFile;
 use crate::messages::Messages;
 
 /// Readings at the start of a file that are looked at before it is filtered.

@@ -63,6 +63,8 @@ mod stored;
 #[cfg(feature = "calibrate")]
 mod tested;
 mod text;
+#[cfg(feature = "trace")]
+pub mod trace;
 mod unit_doubt;
 mod validity;
 

@@ -24,7 +24,7 @@ mod thin;
 
 use minijinja::Environment;
 use minijinja::value::Serde;
-use ohmstrain::{Estimate, EstimatorKind, SensorParams};
+use ohmstrain::{Estimate, EstimatorKind, Scores, SensorParams};
 use serde::Serialize;
 
 pub use axis::Axis;
@@ -80,6 +80,20 @@ pub struct Scored {
     pub until_s: Option<f64>,
 }
 
+impl Scored {
+    /// Rows from a time on, s, if there is one.
+    #[must_use]
+    pub const fn since(from_s: Option<f64>) -> Self {
+        Self { from_s, until_s: None }
+    }
+
+    /// True if a row at this time, s, is one of them.
+    #[must_use]
+    pub fn holds(self, time_s: f64) -> bool {
+        self.from_s.is_none_or(|from_s| time_s >= from_s) && self.until_s.is_none_or(|until_s| time_s < until_s)
+    }
+}
+
 /// Overlap of rows with the calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sample {
@@ -92,6 +106,19 @@ pub enum Sample {
 }
 
 impl Sample {
+    /// Compares times, s, of a file's rows with those that a calibration has of the file of this hash.
+    #[must_use]
+    pub fn of(time_s: &[f64], sha256: &str, params: &SensorParams, scored: Scored) -> Self {
+        let of_it = params.recordings.iter().filter(|info| info.sha256 == sha256);
+        let seen = |time_s: &&f64| of_it.clone().any(|info| (info.first_s..=info.last_s).contains(*time_s));
+        let rows = time_s.iter().filter(|time_s| scored.holds(**time_s));
+        match rows.clone().filter(seen).count() {
+            0 => Self::Out,
+            all if all == rows.count() => Self::In,
+            _ => Self::Partly,
+        }
+    }
+
     /// Returns its name, in a word or two.
     pub const fn name(self) -> &'static str {
         match self {
@@ -117,6 +144,21 @@ pub struct ScoreRow<'a> {
     pub width_95_percent_fs: Option<f64>,
     /// Mean continuous ranked probability score in percent of full scale.
     pub crps_percent_fs: f64,
+}
+
+impl<'a> ScoreRow<'a> {
+    /// The part of an estimator's scores that a report has.
+    #[must_use]
+    pub const fn new(name: &'a str, scores: &Scores) -> Self {
+        Self {
+            name,
+            rmse: scores.rmse,
+            rmse_percent_fs: scores.rmse_percent_fs,
+            coverage_95: scores.coverage_95,
+            width_95_percent_fs: scores.width_95_percent_fs,
+            crps_percent_fs: scores.crps_percent_fs,
+        }
+    }
 }
 
 /// Reason for having no report.

@@ -1,15 +1,16 @@
 //! Calibration, with its progress, as `ohmstrain calibrate` does it.
 
 use js_sys::{Date, Function, JSON};
+use ohmstrain::trace::{TraceFile, check_alike, first_distrusted_rows, known_recordings};
 use ohmstrain::{
-    Calibration, Closing, EstimatorKind, GaugeFamily, Kept, LeftOutRow, Quantity, ReadingUnit, Stage, Tested,
-    calibration_doubts, motion_doubts,
+    Calibration, Closing, EstimatorKind, GaugeFamily, Kept, LeftOutRow, Stage, Tested, calibration_doubts,
+    motion_doubts,
 };
 use ohmstrain_calib::{Samples, screen};
 use serde::Deserialize;
 use wasm_bindgen::prelude::*;
 
-use crate::doubts::{heed, on_one_clock, shift, warn_of_distrusted};
+use crate::doubts::{heed, on_one_clock};
 use crate::json::{json, refused};
 use crate::recording::Recording;
 use crate::sensor::Sensor;
@@ -88,15 +89,15 @@ pub fn calibrate(
 ) -> Result<Calibrated, JsError> {
     let choices = Choices::of(&choices).map_err(refused)?;
     let progress = progress.dyn_into::<Function>().ok();
-    run(recordings, &choices, progress.as_ref()).map_err(refused)
+    run(recordings.into_iter().map(|recording| recording.file).collect(), &choices, progress.as_ref()).map_err(refused)
 }
 
-fn run(wholes: Vec<Recording>, choices: &Choices, progress: Option<&Function>) -> Result<Calibrated, String> {
+fn run(wholes: Vec<TraceFile>, choices: &Choices, progress: Option<&Function>) -> Result<Calibrated, String> {
     let mut recordings = Vec::new();
     for whole in &wholes {
-        let part = whole.between(choices.from, choices.until);
+        let part = whole.rows(whole.between(choices.from, choices.until));
         if part.trace.is_empty() && !whole.trace.is_empty() {
-            return Err(no_rows(whole, choices));
+            return Err(whole.no_rows(choices.from, choices.until).to_string());
         }
         recordings.push(part);
     }
@@ -110,7 +111,7 @@ fn run(wholes: Vec<Recording>, choices: &Choices, progress: Option<&Function>) -
     for ((whole, part), lag_s) in wholes.into_iter().zip(&recordings).zip(lags_s) {
         if part.trace.len() < whole.trace.len() {
             let mut whole = whole;
-            shift(&mut whole, lag_s)?;
+            whole.move_reference(lag_s).map_err(told)?;
             kept.push((whole, part.first_row..part.first_row + part.trace.len()));
         }
     }
@@ -140,46 +141,29 @@ fn run(wholes: Vec<Recording>, choices: &Choices, progress: Option<&Function>) -
     Ok(Calibrated { lines, facts, is_better, advice, warnings, tested, times, left_out: calibrated.left_out, sensor })
 }
 
-fn no_rows(whole: &Recording, choices: &Choices) -> String {
-    let times = &whole.trace.time_s;
-    let (first, last) = (times.first().copied().unwrap_or(f64::NAN), times.last().copied().unwrap_or(f64::NAN));
-    let from = choices.from.map(|from_s| format!("--from {from_s}"));
-    let until = choices.until.map(|until_s| format!("--until {until_s}"));
-    let flags: Vec<String> = from.into_iter().chain(until).collect();
-    format!(
-        "{}: no row is left by {}; the recording goes from {} to {} s",
-        whole.name,
-        flags.join(" "),
-        ohmstrain::number::significant(first, 6),
-        ohmstrain::number::significant(last, 6)
-    )
-}
-
 /// Calibrates a sensor on recordings: untrustworthy rows are left out first, and doubts are answered.
 fn of_recordings(
-    recordings: &[Recording],
+    recordings: &[TraceFile],
     calibration: Calibration,
     progress: Option<&Function>,
     warnings: &mut Vec<String>,
 ) -> Result<ohmstrain::Calibrated, String> {
-    let samples: Vec<Samples> = recordings.iter().map(Recording::samples).collect::<Result<_, _>>()?;
-    let first = recordings.first().ok_or("expected a recording, found none")?;
-    let (quantity, unit) = (first.quantity().unwrap_or(Quantity::Strain), first.unit());
-    for recording in recordings {
-        recording.check_unit(unit)?;
-        recording.check_quantity(quantity)?;
+    if recordings.is_empty() {
+        return Err("expected a recording, found none".into());
     }
+    let samples = recordings.iter().map(TraceFile::samples).collect::<Result<Vec<Samples>, _>>().map_err(told)?;
+    check_alike(recordings).map_err(told)?;
     let names: Vec<&str> = recordings.iter().map(|recording| recording.name.as_str()).collect();
     let named = |error: &ohmstrain::CalibrationError| match error {
         ohmstrain::CalibrationError::TooFewRows { recording, .. } => format!("{}: {error}", names[*recording]),
         _ => format!("{}: {error}", names.join(", ")),
     };
-    let as_read = known(recordings, &samples)?;
+    let as_read = known_recordings(recordings, &samples).map_err(told)?;
     heed(recordings, &motion_doubts(&as_read), warnings)?;
     let screened = screen(&samples).map_err(|error| named(&error))?;
-    let known = known(recordings, &screened.samples())?;
+    let known = known_recordings(recordings, &screened.samples()).map_err(told)?;
     heed(recordings, &calibration_doubts(&known), warnings)?;
-    warn_of_distrusted(recordings, &screened.distrusted, warnings);
+    warnings.extend(first_distrusted_rows(&screened.distrusted, recordings));
     let calibrated = calibration.run_with(&known, |stage| tell(progress, stage)).map_err(|error| match &error {
         ohmstrain::Error::Calibration(error) => named(error),
         other => other.to_string(),
@@ -188,23 +172,9 @@ fn of_recordings(
     Ok(calibrated)
 }
 
-/// Samples of recordings, with what is known of each.
-fn known<'a>(recordings: &'a [Recording], samples: &[Samples<'a>]) -> Result<Vec<ohmstrain::Recording<'a>>, String> {
-    let known = |(recording, samples): (&'a Recording, &Samples<'a>)| {
-        let (trace, metadata) = (&recording.trace, &recording.trace.metadata);
-        let mut one = ohmstrain::Recording::new(samples.time_s(), samples.reading(), samples.strain())
-            .map_err(|error| error.to_string())?;
-        one = one.of_file(&recording.name, &recording.sha256);
-        one = if recording.unit() == ReadingUnit::Ratio { one.of_ratios() } else { one };
-        one = if recording.quantity() == Some(Quantity::AngleDeg) { one.of_angles_deg() } else { one };
-        let knows_ohm = metadata.resistance_unit.is_some() || trace.readings.converter.is_some();
-        one = if metadata.strain_unit.is_some() { one.strain_unit_is_known() } else { one };
-        one = if knows_ohm { one.resistance_unit_is_known() } else { one };
-        let is_clock = |(key, value): &(String, String)| key == "time_unit" && value == "s";
-        one = if metadata.other.iter().any(is_clock) { one.clock_is_known() } else { one };
-        Ok(recording.joint().map_or(one, |joint| one.on_joint(joint)))
-    };
-    recordings.iter().zip(samples).map(known).collect()
+/// An error as JavaScript gets it.
+fn told(error: impl ToString) -> String {
+    error.to_string()
 }
 
 /// Reports the stage of a calibration.

@@ -2,12 +2,13 @@
 
 use std::io;
 
+use ohmstrain::trace::TraceFile;
 use ohmstrain::{Column, Estimate, Interface, QuietWatch, Sensor, ValidityWatch};
 use ohmstrain_bench_data::RowWriter;
 use wasm_bindgen::prelude::*;
 
 use crate::json::refused;
-use crate::recording::Recording;
+use crate::recording::seated;
 
 /// Readings at the start of a recording that are looked at before it is filtered, and rows among which they are looked for.
 const FIRST_READINGS: usize = 100;
@@ -67,14 +68,14 @@ impl Estimates {
 }
 
 /// Through the filter, row by row.
-pub fn filtered(sensor: &Sensor, recording: &Recording) -> Result<Estimates, String> {
-    let sensor = recording.sensor(sensor)?;
+pub fn filtered(sensor: &Sensor, recording: &TraceFile) -> Result<Estimates, String> {
+    let sensor = seated(sensor, recording)?;
     check_readings(&sensor, recording, first_rows(recording))?;
     let mut filter = sensor.filter().build().map_err(|error| error.to_string())?;
     let mut quiet = QuietWatch::new(&sensor, None, &[]);
     let mut rows = Vec::with_capacity(recording.trace.len());
     for row in 0..recording.trace.len() {
-        let (time_s, reading) = recording.row(row);
+        let (time_s, reading) = recording.reading(row);
         let at = |error| format!("{}: data row {}: {error}", recording.name, recording.first_row + row + 1);
         rows.push(filter.step(time_s, reading).map_err(at)?);
     }
@@ -86,8 +87,8 @@ pub fn filtered(sensor: &Sensor, recording: &Recording) -> Result<Estimates, Str
 }
 
 /// Through the smoother.
-pub fn smoothed(sensor: &Sensor, recording: &Recording) -> Result<Estimates, String> {
-    let sensor = recording.sensor(sensor)?;
+pub fn smoothed(sensor: &Sensor, recording: &TraceFile) -> Result<Estimates, String> {
+    let sensor = seated(sensor, recording)?;
     check_readings(&sensor, recording, recording.trace.len())?;
     let mut rows = Vec::with_capacity(recording.trace.len());
     let keep = |_, segment: &[Estimate]| {
@@ -95,27 +96,27 @@ pub fn smoothed(sensor: &Sensor, recording: &Recording) -> Result<Estimates, Str
         Ok::<(), ohmstrain::Error>(())
     };
     let named = |error| format!("{}: {error}", recording.name);
-    sensor.filter().smooth_backward(recording.trace.len(), |row| recording.row(row), keep).map_err(named)?;
+    sensor.filter().smooth_backward(recording.trace.len(), |row| recording.reading(row), keep).map_err(named)?;
     rows.reverse();
     Ok(made(&sensor, recording, rows))
 }
 
 /// Returns the number of rows that are looked at first.
-fn first_rows(recording: &Recording) -> usize {
+fn first_rows(recording: &TraceFile) -> usize {
     let is_known = |row: &usize| recording.trace.readings.values[*row].is_finite();
     let enough = (0..recording.trace.len()).filter(is_known).nth(FIRST_READINGS - 1);
     enough.map_or(recording.trace.len(), |row| row + 1).min(MOST_FIRST_ROWS)
 }
 
 /// Refuses readings in another unit than the sensor's.
-fn check_readings(sensor: &Sensor, recording: &Recording, rows: usize) -> Result<(), String> {
+fn check_readings(sensor: &Sensor, recording: &TraceFile, rows: usize) -> Result<(), String> {
     let first = recording.trace.readings.values.iter().take(rows).copied();
     sensor
         .check_unit(first, None)
         .map_err(|doubt| format!("{}: {}", recording.header, doubt.text(Interface::CommandLine)))
 }
 
-fn made(sensor: &Sensor, recording: &Recording, rows: Vec<Estimate>) -> Estimates {
+fn made(sensor: &Sensor, recording: &TraceFile, rows: Vec<Estimate>) -> Estimates {
     let mut watch = ValidityWatch::new(sensor, None);
     let mut warnings = Vec::new();
     for row in &rows {

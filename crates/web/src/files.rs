@@ -67,8 +67,8 @@ impl Files {
             return None;
         }
         let recording = Recording::of_trace(name, bytes.clone()).ok()?;
-        let is_same =
-            recording.trace.readings.kind == imported.readings.kind && numbers(&recording.trace).eq(numbers(imported));
+        let is_same = recording.file.trace.readings.kind == imported.readings.kind
+            && numbers(&recording.file.trace).eq(numbers(imported));
         is_same.then_some(recording)
     }
 

@@ -1,8 +1,8 @@
 //! A recording as a calibration, a filter or a report takes it: a trace and the bytes of its file.
 
-use ohmstrain::{JointParams, Quantity, Reading, ReadingUnit, Sensor};
-use ohmstrain_bench_data::{Metadata, ReadingKind, ReferenceQuantity, Trace, TraceReader};
-use ohmstrain_calib::Samples;
+use ohmstrain::trace::TraceFile;
+use ohmstrain::{ReadingUnit, Sensor};
+use ohmstrain_bench_data::{Metadata, TraceReader};
 use sha2::{Digest, Sha256};
 use wasm_bindgen::prelude::*;
 
@@ -12,125 +12,26 @@ use crate::json::refused;
 #[wasm_bindgen]
 #[derive(Clone)]
 pub struct Recording {
-    pub(crate) name: String,
-    /// Name of its header in messages: file and line.
-    pub(crate) header: String,
+    pub(crate) file: TraceFile,
     pub(crate) bytes: Vec<u8>,
-    pub(crate) sha256: String,
-    /// Rows of the file before the first one here.
-    pub(crate) first_row: usize,
-    pub(crate) trace: Trace,
 }
 
 impl Recording {
     /// Reads a trace CSV.
     pub(crate) fn of_trace(name: &str, bytes: Vec<u8>) -> Result<Self, ohmstrain_bench_data::TraceError> {
         let rows = TraceReader::with_overrides(bytes.as_slice(), name, &Metadata::default())?;
-        let (name, line) = (rows.file().to_owned(), rows.line());
-        let trace = Trace::collect(rows)?;
         let sha256 = Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect();
-        let header = if line == 0 { name.clone() } else { format!("{name}:{line}") };
-        Ok(Self { header, name, bytes, sha256, first_row: 0, trace })
+        Ok(Self { file: TraceFile::collect(rows, sha256)?, bytes })
     }
+}
 
-    /// Time, s, and reading of a row.
-    pub(crate) fn row(&self, row: usize) -> (f64, Reading) {
-        let (time_s, value) = (self.trace.time_s[row], self.trace.readings.values[row]);
-        let converter = self.trace.readings.converter.as_ref();
-        let sd = converter.and_then(|converter| converter.sd_ohm.get(row).copied()).unwrap_or(0.0);
-        let saturated = converter.is_some_and(|converter| converter.saturated.get(row).copied().unwrap_or(false));
-        (time_s, Reading { value, sd, saturated })
-    }
-
-    /// Returns time, reading and reference in a row.
-    pub(crate) fn known_row(&self, row: usize) -> (f64, Reading, f64) {
-        let (time_s, reading) = self.row(row);
-        (time_s, reading, self.truth(row))
-    }
-
-    /// The reference in a row; NaN where it is missing.
-    pub(crate) fn truth(&self, row: usize) -> f64 {
-        let value = self.trace.reference.as_ref().and_then(|reference| reference.values.get(row));
-        value.copied().unwrap_or(f64::NAN)
-    }
-
-    /// Quantity of the reference.
-    pub(crate) fn quantity(&self) -> Option<Quantity> {
-        self.trace.reference.as_ref().map(|reference| match reference.quantity {
-            ReferenceQuantity::Strain => Quantity::Strain,
-            ReferenceQuantity::AngleDeg => Quantity::AngleDeg,
-        })
-    }
-
-    /// Unit of the readings.
-    pub(crate) fn unit(&self) -> ReadingUnit {
-        match self.trace.readings.kind {
-            ReadingKind::Ohm => ReadingUnit::Ohm,
-            ReadingKind::Ratio => ReadingUnit::Ratio,
-        }
-    }
-
-    /// The joint that its metadata describe.
-    pub(crate) fn joint(&self) -> Option<JointParams> {
-        self.trace.metadata.joint.map(|joint| JointParams {
-            prestrain: joint.prestrain,
-            moment_arm_mm: joint.moment_arm_mm,
-            gauge_length_mm: joint.gauge_length_mm,
-        })
-    }
-
-    /// Returns it in the form that calibration takes.
-    pub(crate) fn samples(&self) -> Result<Samples<'_>, String> {
-        let none = "expected a reference (strain, displacement_mm or angle_deg), found none";
-        let Some(reference) = &self.trace.reference else {
-            return Err(format!("{}: column `strain`: {none}", self.header));
-        };
-        Samples::new(&self.trace.time_s, &self.trace.readings.values, &reference.values)
-            .map_err(|error| format!("{}: data {error}", self.name))
-    }
-
-    /// Refuses readings in another unit than the sensor's.
-    pub(crate) fn check_unit(&self, expected: ReadingUnit) -> Result<(), String> {
-        let column = |unit| if unit == ReadingUnit::Ohm { "resistance_ohm" } else { "resistance_ratio" };
-        let found = self.unit();
-        if found == expected {
-            return Ok(());
-        }
-        let (expected, found) = (column(expected), column(found));
-        let header = &self.header;
-        Err(format!(
-            "{header}: column `{found}`: expected `{expected}` as in the sensor's calibration, found `{found}`"
-        ))
-    }
-
-    /// Refuses a reference that measures another quantity.
-    pub(crate) fn check_quantity(&self, expected: Quantity) -> Result<(), String> {
-        match self.quantity().filter(|found| *found != expected).map(Quantity::name) {
-            None => Ok(()),
-            Some(found) => Err(format!(
-                "{}: column `{found}`: expected a reference in `{}`, as the calibration has it, found `{found}`",
-                self.header,
-                expected.name()
-            )),
-        }
-    }
-
-    /// The sensor as it sits in this recording.
-    pub(crate) fn sensor(&self, sensor: &Sensor) -> Result<Sensor, String> {
-        self.check_unit(sensor.params().reading)?;
-        let sensor = sensor.clone();
-        match self.joint() {
-            Some(joint) => sensor.on_joint(joint).map_err(|error| error.to_string()),
-            None => Ok(sensor),
-        }
-    }
-
-    /// Returns some of its rows, by their times.
-    pub(crate) fn between(&self, from_s: Option<f64>, until_s: Option<f64>) -> Self {
-        let row_at = |time_s: f64| self.trace.time_s.partition_point(|earlier_s| *earlier_s < time_s);
-        let end = until_s.map_or(self.trace.len(), row_at);
-        let rows = from_s.map_or(0, row_at).min(end)..end;
-        Self { first_row: self.first_row + rows.start, trace: self.trace.rows(rows), ..self.clone() }
+/// The sensor as it sits in a recording.
+pub(crate) fn seated(sensor: &Sensor, recording: &TraceFile) -> Result<Sensor, String> {
+    recording.check_unit(sensor.params().reading).map_err(|error| error.to_string())?;
+    let sensor = sensor.clone();
+    match recording.joint() {
+        Some(joint) => sensor.on_joint(joint).map_err(|error| error.to_string()),
+        None => Ok(sensor),
     }
 }
 
@@ -161,43 +62,43 @@ impl Recording {
     /// Its name.
     #[wasm_bindgen(getter)]
     pub fn name(&self) -> String {
-        self.name.clone()
+        self.file.name.clone()
     }
 
     /// Number of rows.
     #[wasm_bindgen(getter)]
     pub fn rows(&self) -> usize {
-        self.trace.len()
+        self.file.trace.len()
     }
 
     /// Times, s.
     #[wasm_bindgen(getter)]
     pub fn time(&self) -> Vec<f64> {
-        self.trace.time_s.clone()
+        self.file.trace.time_s.clone()
     }
 
     /// Readings, Ω or a ratio; NaN where missing.
     #[wasm_bindgen(getter)]
     pub fn reading(&self) -> Vec<f64> {
-        self.trace.readings.values.clone()
+        self.file.trace.readings.values.clone()
     }
 
     /// The reference, strain or degrees; NaN where missing.
     #[wasm_bindgen(getter)]
     pub fn reference(&self) -> Option<Vec<f64>> {
-        self.trace.reference.as_ref().map(|reference| reference.values.clone())
+        self.file.trace.reference.as_ref().map(|reference| reference.values.clone())
     }
 
     /// Returns the quantity of the reference: `strain` or `angle_deg`.
     #[wasm_bindgen(getter, js_name = quantity)]
     pub fn quantity_name(&self) -> Option<String> {
-        self.quantity().map(|quantity| quantity.name().to_owned())
+        self.file.quantity().map(|quantity| quantity.name().to_owned())
     }
 
     /// Unit of the readings: `ohm` or `ratio`.
     #[wasm_bindgen(getter, js_name = unit)]
     pub fn unit_name(&self) -> String {
-        if self.unit() == ReadingUnit::Ohm { "ohm".into() } else { "ratio".into() }
+        if self.file.unit() == ReadingUnit::Ohm { "ohm".into() } else { "ratio".into() }
     }
 
     /// Another handle for it: a calibration takes what it is given.

@@ -1,12 +1,11 @@
 //! The HTML report on a recording, and its figures.
 
+use ohmstrain::trace::TraceFile;
 use ohmstrain::verdict::{Known, verdict};
-use ohmstrain::{MADE_BY, ScoredRow, Scores, Sensor, SensorParams, Tested};
+use ohmstrain::{MADE_BY, ScoredRow, Scores, Sensor, Tested};
 use ohmstrain_calib::Baseline;
 use ohmstrain_report::{FigureFiles, Report, ReportInput, Sample, ScoreRow, Scored};
 use wasm_bindgen::prelude::*;
-
-use crate::recording::Recording;
 
 /// A report and its figures.
 #[wasm_bindgen]
@@ -36,7 +35,7 @@ impl Drawn {
 /// Filters, smooths, scores and draws.
 pub fn drawn(
     sensor: &Sensor,
-    recording: &Recording,
+    recording: &TraceFile,
     facts: &[(&'static str, String)],
     tested: Option<&Tested>,
 ) -> Result<Drawn, String> {
@@ -46,7 +45,7 @@ pub fn drawn(
     let mut filter = builder.build().map_err(named)?;
     let mut filtered = Vec::with_capacity(trace.len());
     for row in 0..trace.len() {
-        let (time_s, reading) = recording.row(row);
+        let (time_s, reading) = recording.reading(row);
         filtered.push(filter.step(time_s, reading).map_err(named)?);
     }
     let mut smoothed = Vec::with_capacity(trace.len());
@@ -54,7 +53,7 @@ pub fn drawn(
         smoothed.extend(segment.iter().rev());
         Ok::<(), ohmstrain::Error>(())
     };
-    builder.smooth_backward(trace.len(), |row| recording.row(row), keep).map_err(named)?;
+    builder.smooth_backward(trace.len(), |row| recording.reading(row), keep).map_err(named)?;
     smoothed.reverse();
     let rest_reading = sensor.rest_reading(None);
     let moved = params.rest_reading / rest_reading;
@@ -66,8 +65,8 @@ pub fn drawn(
     let static_cubic = score(recording, |k| (cubics[k], None));
     let rows = [("filter", filter), ("smoother", of(&smoothed)), ("static cubic", static_cubic)];
     let scores: Vec<ScoreRow> =
-        rows.into_iter().filter_map(|(name, scores)| scores.map(|scores| row(name, &scores))).collect();
-    let sample = sample(recording, params);
+        rows.into_iter().filter_map(|(name, scores)| scores.map(|scores| ScoreRow::new(name, &scores))).collect();
+    let sample = Sample::of(&trace.time_s, &recording.sha256, params, Scored::default());
     let left_out = params.summary.as_ref().filter(|_| sample != Sample::Out).map(Known::from);
     let verdict = filter.map(|filter| {
         let known = [Known::new(&filter, static_cubic.as_ref())].into_iter();
@@ -83,7 +82,7 @@ pub fn drawn(
         smoothed: &smoothed,
         params,
         rest_reading,
-        scored: Scored { from_s: None, until_s: None },
+        scored: Scored::default(),
         sample,
         estimator: params.default_estimator,
         scores: &scores,
@@ -96,33 +95,10 @@ pub fn drawn(
 }
 
 /// Scores of all rows; `None` without a reference.
-fn score(recording: &Recording, estimate: impl Fn(usize) -> (f64, Option<f64>)) -> Option<Scores> {
+fn score(recording: &TraceFile, estimate: impl Fn(usize) -> (f64, Option<f64>)) -> Option<Scores> {
     let row = |k: usize| {
         let (strain, sd) = estimate(k);
         ScoredRow { time_s: recording.trace.time_s[k], truth: recording.truth(k), strain, sd }
     };
     ohmstrain_calib::score(&(0..recording.trace.len()).map(row).collect::<Vec<_>>())
-}
-
-/// Tells if its rows were calibrated on, by the times that a sensor has of each recording.
-fn sample(recording: &Recording, params: &SensorParams) -> Sample {
-    let of_it = params.recordings.iter().filter(|info| info.sha256 == recording.sha256);
-    let seen = |time_s: &&f64| of_it.clone().any(|info| (info.first_s..=info.last_s).contains(*time_s));
-    let rows = recording.trace.time_s.iter();
-    match rows.clone().filter(seen).count() {
-        0 => Sample::Out,
-        all if all == rows.count() => Sample::In,
-        _ => Sample::Partly,
-    }
-}
-
-fn row<'a>(name: &'a str, scores: &Scores) -> ScoreRow<'a> {
-    ScoreRow {
-        name,
-        rmse: scores.rmse,
-        rmse_percent_fs: scores.rmse_percent_fs,
-        coverage_95: scores.coverage_95,
-        width_95_percent_fs: scores.width_95_percent_fs,
-        crps_percent_fs: scores.crps_percent_fs,
-    }
 }

@@ -89,18 +89,18 @@ impl Sensor {
     /// Filters a recording, as `ohmstrain filter` does.
     #[wasm_bindgen(js_name = filterRecording)]
     pub fn filter_recording(&self, recording: &Recording) -> Result<Estimates, JsError> {
-        estimates::filtered(&self.sensor, recording).map_err(refused)
+        estimates::filtered(&self.sensor, &recording.file).map_err(refused)
     }
 
     /// Smooths a recording, as `ohmstrain smooth` does.
     #[wasm_bindgen(js_name = smoothRecording)]
     pub fn smooth_recording(&self, recording: &Recording) -> Result<Estimates, JsError> {
-        estimates::smoothed(&self.sensor, recording).map_err(refused)
+        estimates::smoothed(&self.sensor, &recording.file).map_err(refused)
     }
 
     /// The report on a recording, and its figures.
     pub fn report(&self, recording: &Recording) -> Result<Drawn, JsError> {
-        report::drawn(&self.sensor, recording, &self.facts, self.tested.as_ref()).map_err(refused)
+        report::drawn(&self.sensor, &recording.file, &self.facts, self.tested.as_ref()).map_err(refused)
     }
 
     /// Its filter as source code for a microcontroller, as `ohmstrain export` writes it. `target` is `c` or `rust`, `budget` is

@@ -1,10 +1,10 @@
 use std::ops::Range;
-use std::path::Path;
 use std::time::Instant;
 
+use ohmstrain::trace::{TraceFile, check_alike, known_recordings};
 use ohmstrain::{
-    Calibrated, Calibration, Closing, Error, EstimatorKind, Findings, Kept, Quantity, ReadingUnit, Sensor, Tested,
-    calibration_doubts, motion_doubts,
+    Calibrated, Calibration, Closing, Error, EstimatorKind, Findings, Kept, Sensor, Tested, calibration_doubts,
+    motion_doubts,
 };
 use ohmstrain_calib::{Samples, screen};
 
@@ -13,19 +13,18 @@ use super::explain;
 use super::fleet;
 use super::hand;
 use super::reporting::{Reporting, Wanted};
-use super::scoring::Part;
 use crate::alignment;
 use crate::args::CalibrateArgs;
 use crate::channels::Table;
 use crate::error::CliError;
-use crate::input::{self, TraceFile, unit};
+use crate::input;
 use crate::marks::{self, MarksFile};
 use crate::messages::Messages;
 use crate::output::{Kind, Outputs, named, print};
 use crate::plausible;
 use crate::progress::Progress;
 use crate::sensor_file;
-use ohmstrain_report::Sample;
+use ohmstrain_report::{Sample, Scored};
 
 /// Calibrates a sensor on recordings, writes its parameters, and prints a summary.
 pub fn run(args: &CalibrateArgs, messages: &Messages) -> Result<(), CliError> {
@@ -106,7 +105,7 @@ pub fn calibrate(args: &CalibrateArgs, messages: &Messages) -> Result<Outcome, C
     drop(progress);
     let calibration_s = start.elapsed().as_secs_f64();
     for (recording, whole, _) in &mut kept {
-        alignment::shift(whole, lags_s[*recording])?;
+        whole.move_reference(lags_s[*recording])?;
     }
     let rows: Vec<_> = kept.iter().map(|(_, whole, _)| |row| whole.known_row(row)).collect();
     let kept =
@@ -122,7 +121,7 @@ pub fn calibrate(args: &CalibrateArgs, messages: &Messages) -> Result<Outcome, C
             sensor: &outcome.sensor,
             kind: None,
             rest_resistance: None,
-            part: Part::default(),
+            part: Scored::default(),
             sample: Sample::In,
             tested: outcome.tested.as_ref(),
             facts: &closing.facts(),
@@ -144,11 +143,9 @@ pub fn calibrate(args: &CalibrateArgs, messages: &Messages) -> Result<Outcome, C
 
 /// Rows of a recording between --from and --until.
 pub fn rows_in(args: &CalibrateArgs, recording: &TraceFile) -> Result<Range<usize>, CliError> {
-    let row_at = |time_s: f64| recording.trace.time_s.partition_point(|earlier_s| *earlier_s < time_s);
-    let end = args.until.map_or(recording.trace.len(), row_at);
-    let rows = args.from.map_or(0, row_at).min(end)..end;
+    let rows = recording.between(args.from, args.until);
     if rows.is_empty() && !recording.trace.is_empty() {
-        return Err(recording.no_rows(args.from, args.until));
+        return Err(recording.no_rows(args.from, args.until).into());
     }
     Ok(rows)
 }
@@ -172,13 +169,13 @@ pub fn calibrate_recordings(
     progress: &Progress,
 ) -> Result<Calibrated, CliError> {
     let samples: Vec<Samples> = recordings.iter().map(TraceFile::samples).collect::<Result<_, _>>()?;
-    let (quantity, reading) = common_units(recordings)?;
+    check_alike(recordings)?;
     let names: Vec<&str> = recordings.iter().map(|recording| recording.name.as_str()).collect();
-    let as_read = known_recordings(recordings, &samples, (quantity, reading))?;
+    let as_read = known_recordings(recordings, &samples)?;
     plausible::heed(recordings, &motion_doubts(&as_read), progress.messages())?;
     let screened = screen(&samples).map_err(|error| CliError::calibration(&names, &error))?;
     let samples = screened.samples();
-    let known = known_recordings(recordings, &samples, (quantity, reading))?;
+    let known = known_recordings(recordings, &samples)?;
     plausible::heed(recordings, &calibration_doubts(&known), progress.messages())?;
     plausible::warn_of_distrusted(recordings, &screened.distrusted, progress.messages());
     let calibrated =
@@ -188,43 +185,4 @@ pub fn calibrate_recordings(
         })?;
     plausible::heed(recordings, &calibrated.doubts(), progress.messages())?;
     Ok(calibrated)
-}
-
-/// Samples of recordings, with what is known of each.
-pub fn known_recordings<'a>(
-    recordings: &'a [TraceFile],
-    samples: &[Samples<'a>],
-    (quantity, reading): (Quantity, ReadingUnit),
-) -> Result<Vec<ohmstrain::Recording<'a>>, CliError> {
-    let known = |(recording, samples): (&'a TraceFile, &Samples<'a>)| {
-        let (trace, metadata) = (&recording.trace, &recording.trace.metadata);
-        let mut one = ohmstrain::Recording::new(samples.time_s(), samples.reading(), samples.strain())?;
-        one = if recording.reference_sd.is_empty() { one } else { one.with_strain_sd(&recording.reference_sd)? };
-        one = one.of_file(file_name(&recording.name), &recording.sha256);
-        one = if reading == ReadingUnit::Ratio { one.of_ratios() } else { one };
-        one = if quantity == Quantity::AngleDeg { one.of_angles_deg() } else { one };
-        let knows_ohm = metadata.resistance_unit.is_some() || trace.readings.converter.is_some();
-        one = if metadata.strain_unit.is_some() { one.strain_unit_is_known() } else { one };
-        one = if knows_ohm { one.resistance_unit_is_known() } else { one };
-        let is_clock = |(key, value): &(String, String)| key == "time_unit" && value == "s";
-        one = if metadata.other.iter().any(is_clock) { one.clock_is_known() } else { one };
-        Ok(recording.joint().map_or(one, |joint| one.on_joint(joint)))
-    };
-    recordings.iter().zip(samples).map(known).collect()
-}
-
-/// Returns the name of a file without its path, which is the machine's own business.
-fn file_name(path: &str) -> &str {
-    Path::new(path).file_name().and_then(|name| name.to_str()).unwrap_or(path)
-}
-
-/// Quantity and unit that all recordings share.
-pub fn common_units(recordings: &[TraceFile]) -> Result<(Quantity, ReadingUnit), CliError> {
-    let first = &recordings[0];
-    let (quantity, reading) = (first.quantity().unwrap_or(Quantity::Strain), unit(first.trace.readings.kind));
-    for recording in recordings {
-        input::check_unit(&recording.header, recording.trace.readings.kind, reading)?;
-        recording.check_quantity(quantity)?;
-    }
-    Ok((quantity, reading))
 }

@@ -6,7 +6,7 @@ use ohmstrain_bench_data::simulate::{Material, SimulationSettings};
 use super::calibrate::calibrate_recordings;
 use super::reporting::{Reporting, Wanted};
 use super::score_table::{KEY, add_scores, score_table};
-use super::scoring::{self, Part};
+use super::scoring;
 use super::simulate;
 use super::smooth::write_estimates;
 use crate::args::{DemoArgs, DemoMaterial, ReportArgs};
@@ -17,7 +17,7 @@ use crate::output::{Kind, Outputs, print};
 use crate::progress::Progress;
 use crate::run::estimate;
 use crate::sensor_file;
-use ohmstrain_report::Sample;
+use ohmstrain_report::{Sample, Scored};
 
 /// Share of the recording that calibrates; the rest is the test.
 const CALIBRATION_SHARE: f64 = 0.5;
@@ -54,7 +54,7 @@ pub fn run(args: &DemoArgs, messages: &Messages) -> Result<(), CliError> {
     outputs.put(filtered_output, estimates(&sensor, &estimated.filtered)?);
     outputs.put(smoothed_output, estimates(&sensor, &estimated.smoothed)?);
     progress.doing("writing the report");
-    let part = Part::since(Some(test_from));
+    let part = Scored::since(Some(test_from));
     let closing = Closing {
         file: Some("sensor.toml"),
         params,

@@ -1,4 +1,5 @@
 use comfy_table::Table;
+use ohmstrain::trace::{TraceFile, distrusted_rows};
 use ohmstrain_calib::{
     CalibrationError, Samples, StructureScore, bootstrap_law, compare_structures, identifiability, screen,
 };
@@ -6,9 +7,7 @@ use ohmstrain_sensor::LawParams;
 
 use crate::args::CalibrateArgs;
 use crate::error::CliError;
-use crate::input::TraceFile;
 use crate::output;
-use crate::plausible;
 
 const NOT_TOLD: &str =
     "parameters without the ridge: not told; without it the equations of the law are singular on these recordings\n";
@@ -22,7 +21,7 @@ pub fn text(args: &CalibrateArgs, recordings: &[TraceFile], law: &LawParams) -> 
     let screened = screen(&samples).map_err(failed)?;
     let samples = screened.samples();
     if args.explain {
-        for row in plausible::distrusted(recordings, &screened.distrusted) {
+        for row in distrusted_rows(&screened.distrusted, recordings) {
             text += &(row + "\n");
         }
         let found = match identifiability(&samples, law) {

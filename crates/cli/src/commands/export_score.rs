@@ -1,12 +1,12 @@
 //! Scores of an exported filter on a recording, beside the promised ones and those of the filter on this computer.
 
 use ohmstrain::Sensor;
+use ohmstrain::trace::TraceFile;
 use ohmstrain_calib::{Baseline, ScoredRow};
 use ohmstrain_sensor::{Scores, SensorParams};
 
 use crate::args::ExportArgs;
 use crate::error::CliError;
-use crate::input::TraceFile;
 use crate::output::print;
 use ohmstrain_export::{self as export, Compared, ExportTarget, Plan, Promise, ReplayedRow};
 

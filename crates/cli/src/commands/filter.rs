@@ -3,6 +3,7 @@ use std::path::Path;
 
 use ohmstrain::Interface::CommandLine;
 use ohmstrain::number::significant;
+use ohmstrain::trace::{self, check_unit};
 use ohmstrain::{
     Error, Estimate, Filter, FilterBuilder, Known, LaggedFilter, QuietWatch, Reading, Sensor, Stored, ValidityWatch,
 };
@@ -12,7 +13,6 @@ use crate::args::{FilterArgs, Format, RestResistance, WrittenArgs};
 use crate::error::CliError;
 use crate::estimates::{self, EstimateWriter};
 use crate::filter_state;
-use crate::input::{self, check_unit};
 use crate::messages::Messages;
 use crate::output::{Kind, RowsOut};
 use crate::readings::{late, no_row};
@@ -35,9 +35,9 @@ pub fn run(args: &FilterArgs, messages: &Messages) -> Result<u64, CliError> {
     let mut filter = FilterRun::new(&sensor, args)?;
     suits::warn_of_start(args.estimate.initial_strain, &sensor, messages);
     let mut rows = stream::open(args)?;
-    let header = input::header(rows.file(), rows.line());
+    let header = trace::header(rows.file(), rows.line());
     check_unit(&header, rows.reading_kind(), sensor.params().reading)?;
-    if let Some(joint) = input::joint(&rows.metadata()) {
+    if let Some(joint) = trace::joint(&rows.metadata()) {
         sensor = sensor.on_joint(joint)?;
         filter = FilterRun::new(&sensor, args)?;
     }
@@ -213,7 +213,7 @@ impl<'a, W: io::Write + Send> Stream<'a, W> {
             self.times = Some((self.times.map_or(row.time_s, |times| times.0), row.time_s));
         }
         let at = |error| CliError::Input(format!("{}:{}: {error}", self.sink.file, row.line));
-        self.sink.write(self.filter.step(row.time_s, input::reading(&row.reading)).map_err(at)?)
+        self.sink.write(self.filter.step(row.time_s, trace::reading(&row.reading)).map_err(at)?)
     }
 
     /// The clock has started again: so does the filter. Times stay those of the file.
@@ -223,7 +223,7 @@ impl<'a, W: io::Write + Send> Stream<'a, W> {
         self.finish()?;
         let time_s = significant(row.time_s, 6);
         self.sink.messages.warning(&format!("{at}: the clock has started again, at {time_s} s, and so has the filter"));
-        if let Some(joint) = input::joint(&rows.metadata()) {
+        if let Some(joint) = trace::joint(&rows.metadata()) {
             self.sink.sensor = self.sink.sensor.clone().on_joint(joint)?;
         }
         self.filter = FilterRun::anew(&self.sink.sensor, self.args)?;

@@ -1,12 +1,12 @@
 use std::path::Path;
 
+use ohmstrain::trace::TraceFile;
 use ohmstrain::verdict::{Known, verdict};
-use ohmstrain::{EstimatorKind, Scores, Sensor, SensorParams, Tested};
+use ohmstrain::{EstimatorKind, Scores, Sensor, Tested};
 
-use super::scoring::{self, Part};
+use super::scoring;
 use crate::args::ReportArgs;
 use crate::error::CliError;
-use crate::input::TraceFile;
 use crate::output::{Claim, Kind, Outputs};
 use crate::printable::printable;
 use crate::run::estimate;
@@ -22,7 +22,7 @@ pub struct Reporting<'a> {
     /// Reading of the rested sensor, if it differs from that in calibration.
     pub rest_resistance: Option<f64>,
     /// The rows that are scored, and whether they were calibrated on.
-    pub part: Part,
+    pub part: Scored,
     pub sample: Sample,
     /// Scores on rows that were kept from the calibration, if known.
     pub tested: Option<&'a Tested>,
@@ -85,7 +85,7 @@ impl Reporting<'_> {
         let cubic = scoring::of_baseline(recording, ohmstrain_calib::running_cubic(params.static_cubic), part, moved);
         let rows = [("filter", filter), ("smoother", smoother), ("static cubic", cubic)];
         let scores: Vec<ScoreRow> =
-            rows.into_iter().filter_map(|(name, scores)| scores.map(|scores| row(name, &scores))).collect();
+            rows.into_iter().filter_map(|(name, scores)| scores.map(|scores| ScoreRow::new(name, &scores))).collect();
         let name =
             Path::new(&recording.name).file_name().map_or_else(String::new, |name| name.to_string_lossy().into());
         let input = ReportInput {
@@ -98,7 +98,7 @@ impl Reporting<'_> {
             smoothed: &estimated.smoothed,
             params,
             rest_reading,
-            scored: Scored { from_s: part.from_s, until_s: part.until_s },
+            scored: part,
             sample: self.sample,
             estimator: kind,
             scores: &scores,
@@ -116,31 +116,5 @@ impl Reporting<'_> {
         let left_out = params.summary.as_ref().filter(|_| self.sample != Sample::Out).map(Known::from);
         let known = [Known::new(filter, cubic)].into_iter().chain(left_out).chain(self.tested.map(Known::from));
         verdict(&known.collect::<Vec<_>>())
-    }
-}
-
-/// Tells if the rows of `part` were calibrated on, by the times that a sensor file has of each recording.
-pub fn sample(recording: &TraceFile, params: &SensorParams, part: Part) -> Sample {
-    let of_it = params.recordings.iter().filter(|info| info.sha256 == recording.sha256);
-    let scored = |time_s: &&f64| {
-        part.from_s.is_none_or(|from_s| **time_s >= from_s) && part.until_s.is_none_or(|until_s| **time_s < until_s)
-    };
-    let seen = |time_s: &&f64| of_it.clone().any(|info| (info.first_s..=info.last_s).contains(*time_s));
-    let rows = recording.trace.time_s.iter().filter(scored);
-    match rows.clone().filter(seen).count() {
-        0 => Sample::Out,
-        all if all == rows.count() => Sample::In,
-        _ => Sample::Partly,
-    }
-}
-
-fn row<'a>(name: &'a str, scores: &Scores) -> ScoreRow<'a> {
-    ScoreRow {
-        name,
-        rmse: scores.rmse,
-        rmse_percent_fs: scores.rmse_percent_fs,
-        coverage_95: scores.coverage_95,
-        width_95_percent_fs: scores.width_95_percent_fs,
-        crps_percent_fs: scores.crps_percent_fs,
     }
 }

@@ -1,12 +1,13 @@
 use std::io::{Read, Seek, SeekFrom, Write};
 
+use ohmstrain::trace::{self, check_unit};
 use ohmstrain::{Estimate, FilterBuilder, Sensor, ValidityWatch};
 use tempfile::SpooledTempFile;
 
 use crate::args::{Format, SmoothArgs, WrittenArgs};
 use crate::error::CliError;
 use crate::estimates::{self, EstimateWriter, Packed};
-use crate::input::{self, check_unit};
+use crate::input;
 use crate::messages::Messages;
 use crate::output::RowsOut;
 use crate::readings::{StoredReadings, WAIT_IN_MEMORY, temporary};
@@ -24,9 +25,9 @@ pub fn run(args: &SmoothArgs, messages: &Messages) -> Result<u64, CliError> {
     let mut rows_out = RowsOut::claim(output.as_deref(), columns, replace.force, inputs)?;
     let mut sensor = sensor_file::read(&args.estimate.sensor, wanted)?;
     let rows = input::open(&args.trace_file, &args.estimate.units.metadata())?;
-    let header = input::header(rows.file(), rows.line());
+    let header = trace::header(rows.file(), rows.line());
     check_unit(&header, rows.reading_kind(), sensor.params().reading)?;
-    if let Some(joint) = input::joint(rows.metadata()) {
+    if let Some(joint) = trace::joint(rows.metadata()) {
         sensor = sensor.on_joint(joint)?;
     }
     let name = rows.file().to_string();

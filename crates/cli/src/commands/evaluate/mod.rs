@@ -8,6 +8,7 @@ mod told;
 use std::path::{Path, PathBuf};
 
 pub use evaluation::Evaluation;
+use ohmstrain::trace::TraceFile;
 use ohmstrain_calib::{Baselines, PublishedLaw, Samples, reference_lag, screen};
 use rayon::prelude::*;
 pub use scores::RecordingScores;
@@ -16,17 +17,16 @@ use told::Told;
 
 use crate::args::{EvaluateArgs, Split};
 use crate::commands::hand;
-use crate::commands::reporting::{Drawn, Reporting, Wanted, sample};
-use crate::commands::scoring::Part;
+use crate::commands::reporting::{Drawn, Reporting, Wanted};
 use crate::error::CliError;
-use crate::input::{self, TraceFile, check_unit};
+use crate::input;
 use crate::messages::Messages;
 use crate::output::{Outputs, print};
 use crate::progress::Progress;
 use crate::run::rest_resistance;
 use crate::sensor_file;
 use crate::suits;
-use ohmstrain_report::Sample;
+use ohmstrain_report::{Sample, Scored};
 
 /// Smallest coverage of the 95 % interval that `--check` accepts.
 const LEAST_COVERAGE: f64 = 0.8;
@@ -77,7 +77,7 @@ fn with_sensor_file(
 ) -> Result<(), CliError> {
     let sensors = JudgedSensor::from_file(path, args.estimator, args.with_correction())?;
     let rivals = Rivals { static_cubic: sensors[0].sensor.params().static_cubic, learned: None, published: None };
-    let judged = |path: &PathBuf| judge(args, &read(args, path)?, Part::since(args.from), &sensors, &rivals);
+    let judged = |path: &PathBuf| judge(args, &read(args, path)?, Scored::since(args.from), &sensors, &rivals);
     add_until_error(evaluation, args.traces.par_iter().map(judged).collect(), messages)
 }
 
@@ -108,7 +108,7 @@ fn with_split(
     progress.doing("scoring");
     let lag_s = reference_lag(&recording.samples()?).ok().map(|lag| lag.lag_s);
     let (scored, time_at) = (split.scored(rows), |row: usize| recording.trace.time_s.get(row).copied());
-    let part = Part { from_s: time_at(scored.start), until_s: time_at(scored.end) };
+    let part = Scored { from_s: time_at(scored.start), until_s: time_at(scored.end) };
     let Judged { mut scores, drawn, .. } = judge(args, recording, part, &sensors, &rivals)?;
     for scores in &mut scores {
         (scores.lag_s, scores.split) = (Some(lag_s), Some(split.to_string()));
@@ -125,7 +125,7 @@ fn with_training(args: &EvaluateArgs, evaluation: &mut Evaluation, messages: &Me
     let tests: Vec<TraceFile> = args.test.iter().map(|path| read(path)).collect::<Result<_, _>>()?;
     let (sensors, rivals) = calibrated(&training, args, &progress)?;
     progress.doing("scoring");
-    let judged = |recording: &TraceFile| judge(args, recording, Part::since(args.from), &sensors, &rivals);
+    let judged = |recording: &TraceFile| judge(args, recording, Scored::since(args.from), &sensors, &rivals);
     add_until_error(evaluation, tests.par_iter().map(judged).collect(), messages)
 }
 
@@ -141,7 +141,7 @@ fn with_each_left_out(args: &EvaluateArgs, evaluation: &mut Evaluation, messages
         progress.doing("calibrating");
         let (sensors, rivals) = calibrated(&recordings, args, &progress)?;
         progress.doing("scoring");
-        let mut judged = judge(args, &left_out, Part::since(args.from), &sensors, &rivals)?;
+        let mut judged = judge(args, &left_out, Scored::since(args.from), &sensors, &rivals)?;
         judged.scores.iter_mut().for_each(|scores| scores.split = Some("left out".to_owned()));
         add_until_error(evaluation, vec![Ok(judged)], messages)?;
         recordings.insert(place, left_out);
@@ -198,13 +198,13 @@ struct Judged {
 fn judge(
     args: &EvaluateArgs,
     recording: &TraceFile,
-    part: Part,
+    part: Scored,
     sensors: &[JudgedSensor],
     rivals: &Rivals,
 ) -> Result<Judged, CliError> {
     let mut judged = Judged::default();
     let Some(JudgedSensor { sensor: first, kind, .. }) = sensors.first() else { return Ok(judged) };
-    check_unit(&recording.header, recording.trace.readings.kind, first.params().reading)?;
+    recording.check_unit(first.params().reading)?;
     recording.samples()?;
     recording.check_quantity(first.params().quantity)?;
     let readings = || recording.trace.readings.values.iter().copied();
@@ -213,7 +213,7 @@ fn judge(
     suits::check_reference(recording, first)?;
     let last_s = recording.trace.time_s.last().copied();
     if part.until_s.is_none() && part.from_s.zip(last_s).is_some_and(|(from_s, last_s)| from_s > last_s) {
-        return Err(recording.no_rows(part.from_s, None));
+        return Err(recording.no_rows(part.from_s, None).into());
     }
     let nothing = || {
         let rows = part.from_s.map_or_else(|| "any row".into(), |from| format!("time_s >= {from}"));
@@ -222,7 +222,11 @@ fn judge(
     let moved = first.params().rest_reading / first.rest_reading(rest);
     let baselines = rivals.scores(recording, part, moved).ok_or_else(nothing)?;
     let has_split = !args.calibration.split.is_empty();
-    let sample = if has_split { Sample::Out } else { sample(recording, first.params(), part) };
+    let sample = if has_split {
+        Sample::Out
+    } else {
+        Sample::of(&recording.trace.time_s, &recording.sha256, first.params(), part)
+    };
     for sensor in sensors {
         let of_whole = args.known_every.filter(|_| !sensor.is_part());
         for told in Told::cases(recording, part, sensor.sensor.params().limits, of_whole) {

@@ -1,6 +1,7 @@
 use std::path::Path;
 use std::time::Instant;
 
+use ohmstrain::trace::TraceFile;
 use ohmstrain::{Calibrated, Calibration, ValidityWatch};
 use ohmstrain_bench_data::segment;
 use ohmstrain_calib::{Baselines, PhaseRows, PublishedLaw, RECIPE};
@@ -11,13 +12,12 @@ use super::settled::SettledScores;
 use super::told::Told;
 use crate::args::Estimators;
 use crate::commands::calibrate::calibrate_recordings;
-use crate::commands::scoring::{self, Part};
+use crate::commands::scoring;
 use crate::error::CliError;
-use crate::input::TraceFile;
 use crate::progress::Progress;
 use crate::run::estimate;
 use crate::sensor_file;
-use ohmstrain_report::Sample;
+use ohmstrain_report::{Sample, Scored};
 
 /// A calibrated sensor and the estimator that it is judged with.
 pub struct JudgedSensor {
@@ -111,7 +111,7 @@ impl JudgedSensor {
     pub fn judge(
         &self,
         recording: &TraceFile,
-        part: Part,
+        part: Scored,
         rest_resistance: Option<f64>,
         told: &Told,
         baselines: BaselineScores,
@@ -154,7 +154,7 @@ impl JudgedSensor {
 impl Rivals {
     /// Scores on some rows of a recording, whose readings times `moved` are as those of the calibration; `None` without a
     /// reference.
-    pub fn scores(&self, recording: &TraceFile, part: Part, moved: f64) -> Option<BaselineScores> {
+    pub fn scores(&self, recording: &TraceFile, part: Scored, moved: f64) -> Option<BaselineScores> {
         let learned = match &self.learned {
             None => None,
             Some(learned) => Some(LearnedScores {
@@ -169,7 +169,7 @@ impl Rivals {
         Some(BaselineScores { static_cubic, learned })
     }
 
-    fn of_published(&self, recording: &TraceFile, part: Part, moved: f64) -> Option<ohmstrain::Scores> {
+    fn of_published(&self, recording: &TraceFile, part: Scored, moved: f64) -> Option<ohmstrain::Scores> {
         let time_s = &recording.trace.time_s;
         let strain: Vec<f64> = (0..time_s.len()).map(|row| recording.truth(row)).collect();
         let phases = phases(time_s, &strain).into_iter().map(|(phase, rows)| (time_s[rows.start], phase)).collect();

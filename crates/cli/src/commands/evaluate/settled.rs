@@ -1,13 +1,13 @@
+use ohmstrain_report::Scored;
 use std::fmt;
 
 use ohmstrain::Estimate;
+use ohmstrain::trace::TraceFile;
 use ohmstrain_calib::{Hold, ScoredRow, holds};
 use ohmstrain_sensor::Scores;
 use serde::Serialize;
 
-use crate::commands::scoring::Part;
 use crate::error::CliError;
-use crate::input::TraceFile;
 
 /// Shorter holds, s, end before readings have settled.
 const LEAST_HOLD_S: f64 = 60.0;
@@ -37,7 +37,12 @@ pub struct SettledScores {
 
 impl SettledScores {
     /// Computes the scores for the holds of a recording, whose strains have a range of `span`; `None` without a long one.
-    pub fn new(recording: &TraceFile, estimates: &[Estimate], part: Part, span: f64) -> Result<Option<Self>, CliError> {
+    pub fn new(
+        recording: &TraceFile,
+        estimates: &[Estimate],
+        part: Scored,
+        span: f64,
+    ) -> Result<Option<Self>, CliError> {
         let time_s = &recording.trace.time_s;
         let mut holds = holds(&recording.samples()?, span, LEAST_HOLD_S);
         holds.retain(|hold| hold.rows.clone().all(|row| part.holds(time_s[row])));

@@ -1,8 +1,8 @@
 use ohmstrain::{KNOWN_BEYOND, Known};
+use ohmstrain_report::Scored;
 use ohmstrain_sensor::RangeParams;
 
-use crate::commands::scoring::Part;
-use crate::input::TraceFile;
+use ohmstrain::trace::TraceFile;
 
 /// Largest distance from an end of the reference's range at which a strain counts as one at that end, in ranges.
 const NEAR_END: f64 = 0.1;
@@ -18,7 +18,7 @@ pub struct Told {
 impl Told {
     /// Returns the cases: no known strain; if a time between them is given, s, one known strain after every such time, and the first ones
     /// near the ends of the range. All of them lie in the part that is scored, and in the range that an estimator accepts.
-    pub fn cases(recording: &TraceFile, part: Part, limits: RangeParams, every_s: Option<f64>) -> Vec<Self> {
+    pub fn cases(recording: &TraceFile, part: Scored, limits: RangeParams, every_s: Option<f64>) -> Vec<Self> {
         let mut cases = vec![Self { name: None, known: Vec::new() }];
         if let Some(every_s) = every_s {
             let reach = KNOWN_BEYOND * limits.span();

@@ -1,12 +1,12 @@
 //! Comparison of several laws on the same segments, by Akaike's and the Bayesian criterion.
 
+use ohmstrain::trace::TraceFile;
 use serde::Serialize;
 
 use super::rows::{Cell, LawTable};
 use super::{Fits, Fitted, fit_recording, output};
 use crate::args::FitLawArgs;
 use crate::error::CliError;
-use crate::input::TraceFile;
 use crate::messages::Messages;
 use crate::output::{json, print};
 use ohmstrain::number::{fixed, significant};

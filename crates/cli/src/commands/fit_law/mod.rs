@@ -7,12 +7,13 @@ mod pieces;
 mod published;
 mod rows;
 
+use ohmstrain::trace::TraceFile;
 use ohmstrain_bench_data::ReadingKind;
 use ohmstrain_calib::closed_form::{ClosedForm, ClosedFormFit, ModulusShape, fit_closed_form};
 
 use crate::args::{FitLawArgs, RestResistance, phase_name};
 use crate::error::CliError;
-use crate::input::{self, TraceFile};
+use crate::input;
 use crate::messages::Messages;
 use crate::run::median_of_first;
 use pieces::{Piece, pieces};

@@ -1,5 +1,6 @@
 use std::ops::Range;
 
+use ohmstrain::trace::TraceFile;
 use ohmstrain_bench_data::{Segment, segment};
 use ohmstrain_calib::Samples;
 use ohmstrain_calib::closed_form::{ClosedForm, Datum, hold_data, moving_data, whole_data};
@@ -7,7 +8,6 @@ use ohmstrain_model::Phase;
 
 use crate::args::{FitLawArgs, SegmentChoice, phase_name};
 use crate::error::CliError;
-use crate::input::TraceFile;
 
 /// Piece for one fit: a segment, or a movement with the hold after it.
 pub struct Piece {

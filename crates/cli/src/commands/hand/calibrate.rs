@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use ohmstrain::trace::{TraceFile, check_alike, known_recordings};
 use ohmstrain::{Calibrated, Fused, MADE_BY, Recording, fuse};
 use ohmstrain_calib::Samples;
 use serde::Serialize;
@@ -11,9 +12,8 @@ use super::description::{Channel as Entry, FORMAT};
 use super::scores::{self, ChannelScores, JointScores};
 use crate::args::CalibrateArgs;
 use crate::channels::{Channel, Table, reference};
-use crate::commands::calibrate::{calibrate_recordings, calibration, common_units, known_recordings, rows_in};
+use crate::commands::calibrate::{calibrate_recordings, calibration, rows_in};
 use crate::error::CliError;
-use crate::input::TraceFile;
 use crate::messages::Messages;
 use crate::output::{Claim, Kind, Outputs, print};
 use crate::progress::Progress;
@@ -212,7 +212,8 @@ fn fused(recordings: &[Vec<TraceFile>], calibrated: &[Calibrated]) -> Result<Fus
     let mut known: Vec<Vec<Recording>> = Vec::new();
     for traces in recordings {
         let samples: Vec<Samples> = traces.iter().map(TraceFile::samples).collect::<Result<_, _>>()?;
-        known.push(known_recordings(traces, &samples, common_units(traces)?)?);
+        check_alike(traces)?;
+        known.push(known_recordings(traces, &samples)?);
     }
     let pairs: Vec<(&Calibrated, &[Recording])> =
         calibrated.iter().zip(&known).map(|(calibrated, known)| (calibrated, known.as_slice())).collect();

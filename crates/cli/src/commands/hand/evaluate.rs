@@ -1,7 +1,9 @@
 //! A hand's estimates beside the references of a recording of all its channels.
 
+use ohmstrain_report::Scored;
 use std::path::Path;
 
+use ohmstrain::trace::TraceFile;
 use ohmstrain::{Reading, ScoredRow, score};
 use ohmstrain_bench_data::Metadata;
 
@@ -10,9 +12,7 @@ use super::joint::Joint;
 use super::scores::{self, ChannelScores, JointScores};
 use crate::args::{Estimators, EvaluateArgs};
 use crate::channels::{Channel, Table};
-use crate::commands::scoring::Part;
 use crate::error::CliError;
-use crate::input::TraceFile;
 use crate::output::print;
 
 /// Scores every recording with the joints of a description.
@@ -29,7 +29,7 @@ pub fn run(args: &EvaluateArgs, hand: &Path) -> Result<(), CliError> {
         let mut joints = Vec::new();
         for joint in &description.joints {
             let joint = Joint::new(joint, folder, &name)?;
-            joints.push(scored(joint, &table, &args.units.metadata(), Part::since(args.from))?);
+            joints.push(scored(joint, &table, &args.units.metadata(), Scored::since(args.from))?);
         }
         print(|out| scores::write(out, &name, &joints, args.json))?;
     }
@@ -54,7 +54,7 @@ fn refuse_flags(args: &EvaluateArgs) -> Result<(), CliError> {
 }
 
 /// Scores a joint on the rows of `part`; its filter starts at the first row.
-pub fn scored(mut joint: Joint, table: &Table, overrides: &Metadata, part: Part) -> Result<JointScores, CliError> {
+pub fn scored(mut joint: Joint, table: &Table, overrides: &Metadata, part: Scored) -> Result<JointScores, CliError> {
     let known = table.channels()?;
     let trace = |column: &str| -> Result<TraceFile, CliError> {
         let found: Option<&Channel> = known.iter().find(|channel| channel.column == column);

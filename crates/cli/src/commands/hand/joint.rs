@@ -1,11 +1,11 @@
 use std::path::Path;
 
+use ohmstrain::trace::{self, reading_column};
 use ohmstrain::{Error, Estimate, Filter, FusedFilter, FusedSensor, Quantity, Reading, ReadingUnit, Sensor, UnitGuess};
 use ohmstrain_bench_data::{LineParser, Metadata};
 
 use super::description::{Channel as Entry, Joint as Description};
 use crate::error::CliError;
-use crate::input::{self, reading_column};
 use crate::sensor_file;
 use crate::suits::FIRST_LIVE_READINGS;
 use crate::whole_file;
@@ -141,7 +141,7 @@ impl<'a> Channel<'a> {
         let mut sensor = sensor_file::read(&folder.join(&entry.sensor), None)?;
         if let Some(spec) = joint.joint {
             let metadata = Metadata { joint: Some(spec), ..Metadata::default() };
-            if let Some(joint) = input::joint(&metadata) {
+            if let Some(joint) = trace::joint(&metadata) {
                 sensor = sensor.on_joint(joint)?;
             }
         }

@@ -13,11 +13,11 @@ use std::io::{self, BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
 use ohmstrain::Reading;
+use ohmstrain::trace;
 use ohmstrain_bench_data::{Line, Row, RowWriter, counted};
 
 use crate::args::HandArgs;
 use crate::error::CliError;
-use crate::input;
 use crate::messages::Messages;
 use crate::output::RowsOut;
 use crate::whole_file::is_stdin;
@@ -177,7 +177,7 @@ fn write<W: Write>(joints: &mut [Joint], rows: &[Row], out: &mut RowWriter<W>) -
     let (mut flags, mut values, mut rest) = (Vec::new(), Vec::new(), rows);
     for joint in joints {
         let (own, others) = rest.split_at(joint.channels.len());
-        let readings: Vec<Reading> = own.iter().map(|row| input::reading(&row.reading)).collect();
+        let readings: Vec<Reading> = own.iter().map(|row| trace::reading(&row.reading)).collect();
         let row = joint.step(time_s, &readings)?;
         flags.extend(row.flags);
         values.extend([row.value, row.sd]);

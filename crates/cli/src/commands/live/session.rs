@@ -5,13 +5,13 @@ use std::time::Instant;
 
 use ohmstrain::Interface::CommandLine;
 use ohmstrain::number::significant;
+use ohmstrain::trace::{self, check_unit};
 use ohmstrain::{Error, Estimate, Filter, QuietWatch, Sensor, ValidityWatch};
 use ohmstrain_bench_data::{Line, LineParser, Row, counted};
 
 use super::recorder::Recorder;
 use crate::args::{LiveArgs, RestResistance};
 use crate::error::CliError;
-use crate::input::{self, check_unit};
 use crate::run::{builder, builder_anew, median, of_first};
 use crate::suits::FIRST_LIVE_READINGS;
 
@@ -183,7 +183,7 @@ impl<'a> Session<'a> {
         let kind = self.lines.reading_kind();
         let header = self.args.source();
         kind.map_or(Ok(()), |kind| check_unit(&header, kind, self.sensor.params().reading))?;
-        if let Some(joint) = input::joint(&self.lines.metadata()) {
+        if let Some(joint) = trace::joint(&self.lines.metadata()) {
             self.sensor = self.calibrated.clone().on_joint(joint)?;
         }
         // What was said of lines above it is settled.
@@ -225,7 +225,7 @@ impl<'a> Session<'a> {
         if restarted {
             self.restart()?;
         }
-        let estimate = match self.filter.step(row.time_s, input::reading(&row.reading)) {
+        let estimate = match self.filter.step(row.time_s, trace::reading(&row.reading)) {
             Ok(estimate) => estimate,
             Err(error) => {
                 self.counts.bad_lines += 1;

@@ -3,13 +3,14 @@
 mod rows;
 mod table;
 
+use ohmstrain::trace::{TraceFile, reading_column};
 use ohmstrain_calib::CalibrationError;
 use ohmstrain_calib::likelihood::{LikelihoodProblem, NoiseParameter, NoiseStart, ProfileInterval, ReadingSeries};
 use ohmstrain_sensor::{EstimatorKind, LawParams, SensorError, SensorParams};
 
 use crate::args::RefineArgs;
 use crate::error::CliError;
-use crate::input::{self, TraceFile, check_unit, reading_column};
+use crate::input;
 use crate::messages::Messages;
 use crate::output::{Kind, Outputs, print};
 use crate::progress::Progress;
@@ -34,7 +35,7 @@ pub fn run(args: &RefineArgs, messages: &Messages) -> Result<(), CliError> {
     let output = outputs.claim(&args.output, Kind::Sensor)?;
     let sensor = sensor_file::read(&args.sensor, Some(EstimatorKind::Ekf))?;
     let recording = input::read(&args.trace_file, &args.units.metadata())?;
-    check_unit(&recording.header, recording.trace.readings.kind, sensor.params().reading)?;
+    recording.check_unit(sensor.params().reading)?;
     let readings = || recording.trace.readings.values.iter().copied();
     let rest = rest_resistance(args.rest_resistance, &sensor, readings(), &recording.name)?;
     suits::check_readings(&recording.header, &sensor, rest, readings())?;

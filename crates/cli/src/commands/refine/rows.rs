@@ -1,5 +1,6 @@
+use ohmstrain::trace::TraceFile;
+
 use crate::error::CliError;
-use crate::input::TraceFile;
 
 /// Rows for which a maximum and its intervals take seconds; more of them are thinned, since the model is continuous in
 /// time.
@@ -34,7 +35,7 @@ impl RelativeRows {
             trace = trace.since(from);
         }
         if trace.is_empty() {
-            return Err(recording.no_rows(from, until));
+            return Err(recording.no_rows(from, until).into());
         }
         let stride = trace.len().div_ceil(MOST_ROWS).max(1);
         let rows = TraceFile { trace, ..recording.rows(0..0) };

@@ -1,0 +1,355 @@
+//! Recordings as traces: the rows of a trace CSV, with the name, the header and the hash of the file that they stand in.
+
+use std::io::Read;
+use std::ops::Range;
+use std::path::Path;
+
+use ohmstrain_bench_data::{
+    Metadata, Reading as TraceReading, ReadingKind, ReferenceQuantity, Trace, TraceError, TraceReader,
+};
+use ohmstrain_calib::{Distrusted, Samples, SamplesError, aligned};
+use ohmstrain_sensor::{JointParams, Quantity, ReadingUnit};
+use thiserror::Error;
+
+use crate::number::significant;
+use crate::{CalibrationDoubt, Error, Interface, Reading, Recording};
+
+/// Rows that take no part in a calibration, named one by one.
+const NAMED_ROWS: usize = 5;
+
+/// A recording in memory.
+#[derive(Clone, Debug)]
+pub struct TraceFile {
+    /// Name in messages.
+    pub name: String,
+    /// Name of its header in messages: file and line.
+    pub header: String,
+    /// SHA-256 of its bytes, hexadecimal.
+    pub sha256: String,
+    /// Rows of the file before the first one here.
+    pub first_row: usize,
+    /// Its contents.
+    pub trace: Trace,
+    /// Standard deviations of the reference; empty if it is exact.
+    pub reference_sd: Vec<f64>,
+}
+
+/// Reason why a trace does not suit a calibration or a sensor.
+#[derive(Debug, Error)]
+pub enum TraceFileError {
+    /// It has no reference.
+    #[error("{header}: column `strain`: expected a reference (strain, displacement_mm or angle_deg), found none")]
+    NoReference {
+        /// Name of its header.
+        header: String,
+    },
+    /// A row is not as it must be.
+    #[error("{name}: data {error}")]
+    Samples {
+        /// Its name.
+        name: String,
+        /// The row and what is wrong with it.
+        error: SamplesError,
+    },
+    /// No row lies between the times that are asked for.
+    #[error("{name}: no row is left by {flags}; the recording goes from {first_s} to {last_s} s")]
+    NoRows {
+        /// Its name.
+        name: String,
+        /// Flags of the command line that ask.
+        flags: String,
+        /// Time of its first row, s, in six digits.
+        first_s: String,
+        /// Time of its last row, s, in six digits.
+        last_s: String,
+    },
+    /// Readings are in another unit than the sensor's.
+    #[error("{header}: column `{found}`: expected `{expected}` as in the sensor's calibration, found `{found}`")]
+    Unit {
+        /// Name of its header.
+        header: String,
+        /// Column of the sensor's readings.
+        expected: &'static str,
+        /// Its own.
+        found: &'static str,
+    },
+    /// The reference measures another quantity.
+    #[error(
+        "{header}: column `{found}`: expected a reference in `{expected}`, as the calibration has it, found `{found}`"
+    )]
+    Quantity {
+        /// Name of its header.
+        header: String,
+        /// The sensor's quantity.
+        expected: &'static str,
+        /// Its own.
+        found: &'static str,
+    },
+}
+
+impl TraceFile {
+    /// Collects the rows of a reader.
+    ///
+    /// # Errors
+    /// The first row that cannot be read.
+    pub fn collect<R: Read>(rows: TraceReader<R>, sha256: String) -> Result<Self, TraceError> {
+        let (name, header) = (rows.file().to_owned(), header(rows.file(), rows.line()));
+        Ok(Self { name, header, sha256, first_row: 0, trace: Trace::collect(rows)?, reference_sd: Vec::new() })
+    }
+
+    /// Returns some of its rows, under the same name.
+    #[must_use]
+    pub fn rows(&self, rows: Range<usize>) -> Self {
+        Self {
+            name: self.name.clone(),
+            header: self.header.clone(),
+            sha256: self.sha256.clone(),
+            first_row: self.first_row + rows.start,
+            reference_sd: self.reference_sd.get(rows.clone()).unwrap_or_default().to_vec(),
+            trace: self.trace.rows(rows),
+        }
+    }
+
+    /// Rows with `from_s <= time_s < until_s`, as far as these are given.
+    #[must_use]
+    pub fn between(&self, from_s: Option<f64>, until_s: Option<f64>) -> Range<usize> {
+        let row_at = |time_s: f64| self.trace.time_s.partition_point(|earlier_s| *earlier_s < time_s);
+        let end = until_s.map_or(self.trace.len(), row_at);
+        from_s.map_or(0, row_at).min(end)..end
+    }
+
+    /// Returns the error that no row lies between these times.
+    #[must_use]
+    pub fn no_rows(&self, from_s: Option<f64>, until_s: Option<f64>) -> TraceFileError {
+        let from = from_s.map(|from_s| format!("--from {from_s}"));
+        let until = until_s.map(|until_s| format!("--until {until_s}"));
+        let time = |time_s: Option<&f64>| significant(time_s.copied().unwrap_or(f64::NAN), 6);
+        TraceFileError::NoRows {
+            name: self.name.clone(),
+            flags: from.into_iter().chain(until).collect::<Vec<_>>().join(" "),
+            first_s: time(self.trace.time_s.first()),
+            last_s: time(self.trace.time_s.last()),
+        }
+    }
+
+    /// Moves a reference that is late by `lag_s`.
+    ///
+    /// # Errors
+    /// There is no reference, or a row is not as it must be.
+    pub fn move_reference(&mut self, lag_s: f64) -> Result<(), TraceFileError> {
+        let moved = aligned(&self.samples()?, lag_s);
+        if let Some(reference) = &mut self.trace.reference {
+            reference.values = moved;
+        }
+        Ok(())
+    }
+
+    /// Returns it in the form that calibration takes.
+    ///
+    /// # Errors
+    /// There is no reference, or a row is not as it must be.
+    pub fn samples(&self) -> Result<Samples<'_>, TraceFileError> {
+        let Some(reference) = &self.trace.reference else {
+            return Err(TraceFileError::NoReference { header: self.header.clone() });
+        };
+        let samples = Samples::new(&self.trace.time_s, &self.trace.readings.values, &reference.values);
+        let samples = match &self.reference_sd[..] {
+            [] => samples,
+            sd => samples.and_then(|samples| samples.with_strain_sd(sd)),
+        };
+        samples.map_err(|error| TraceFileError::Samples { name: self.name.clone(), error })
+    }
+
+    /// Returns these samples of it with its file, units, clock and joint, as far as it says them.
+    fn recording<'a>(&'a self, samples: &Samples<'a>) -> Result<Recording<'a>, Error> {
+        let metadata = &self.trace.metadata;
+        let mut one = Recording::new(samples.time_s(), samples.reading(), samples.strain())?;
+        one = if self.reference_sd.is_empty() { one } else { one.with_strain_sd(&self.reference_sd)? };
+        one = one.of_file(file_name(&self.name), &self.sha256);
+        one = if self.unit() == ReadingUnit::Ratio { one.of_ratios() } else { one };
+        one = if self.quantity() == Some(Quantity::AngleDeg) { one.of_angles_deg() } else { one };
+        let knows_ohm = metadata.resistance_unit.is_some() || self.trace.readings.converter.is_some();
+        one = if metadata.strain_unit.is_some() { one.strain_unit_is_known() } else { one };
+        one = if knows_ohm { one.resistance_unit_is_known() } else { one };
+        let is_clock = |(key, value): &(String, String)| key == "time_unit" && value == "s";
+        one = if metadata.other.iter().any(is_clock) { one.clock_is_known() } else { one };
+        Ok(self.joint().map_or(one, |joint| one.on_joint(joint)))
+    }
+
+    /// Time, s, and reading of a row.
+    #[must_use]
+    pub fn reading(&self, row: usize) -> (f64, Reading) {
+        let (time_s, value) = (self.trace.time_s[row], self.trace.readings.values[row]);
+        let converter = self.trace.readings.converter.as_ref();
+        let sd = converter.and_then(|converter| converter.sd_ohm.get(row).copied()).unwrap_or(0.0);
+        let saturated = converter.is_some_and(|converter| converter.saturated.get(row).copied().unwrap_or(false));
+        (time_s, Reading { value, sd, saturated })
+    }
+
+    /// The reference in a row; NaN where it is missing.
+    #[must_use]
+    pub fn truth(&self, row: usize) -> f64 {
+        let value = self.trace.reference.as_ref().and_then(|reference| reference.values.get(row));
+        value.copied().unwrap_or(f64::NAN)
+    }
+
+    /// Returns time, s, reading and reference in a row.
+    #[must_use]
+    pub fn known_row(&self, row: usize) -> (f64, Reading, f64) {
+        let (time_s, reading) = self.reading(row);
+        (time_s, reading, self.truth(row))
+    }
+
+    /// Quantity of the reference.
+    #[must_use]
+    pub fn quantity(&self) -> Option<Quantity> {
+        self.trace.reference.as_ref().map(|reference| match reference.quantity {
+            ReferenceQuantity::Strain => Quantity::Strain,
+            ReferenceQuantity::AngleDeg => Quantity::AngleDeg,
+        })
+    }
+
+    /// Unit of the readings.
+    #[must_use]
+    pub const fn unit(&self) -> ReadingUnit {
+        unit(self.trace.readings.kind)
+    }
+
+    /// The joint that its metadata describe.
+    #[must_use]
+    pub fn joint(&self) -> Option<JointParams> {
+        joint(&self.trace.metadata)
+    }
+
+    /// Refuses readings in another unit than the sensor's.
+    ///
+    /// # Errors
+    /// They are.
+    pub fn check_unit(&self, expected: ReadingUnit) -> Result<(), TraceFileError> {
+        check_unit(&self.header, self.trace.readings.kind, expected)
+    }
+
+    /// Refuses a reference that measures another quantity than the sensor's.
+    ///
+    /// # Errors
+    /// It does.
+    pub fn check_quantity(&self, expected: Quantity) -> Result<(), TraceFileError> {
+        match self.quantity() {
+            Some(found) if found != expected => Err(TraceFileError::Quantity {
+                header: self.header.clone(),
+                expected: expected.name(),
+                found: found.name(),
+            }),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Refuses recordings that do not share unit and quantity with the first.
+///
+/// # Errors
+/// The first one that does not.
+pub fn check_alike(recordings: &[TraceFile]) -> Result<(), TraceFileError> {
+    let Some(first) = recordings.first() else { return Ok(()) };
+    let (quantity, reading) = (first.quantity().unwrap_or(Quantity::Strain), first.unit());
+    for recording in recordings {
+        recording.check_unit(reading)?;
+        recording.check_quantity(quantity)?;
+    }
+    Ok(())
+}
+
+/// Samples of recordings, with what is known of each.
+///
+/// # Errors
+/// A row is not as it must be.
+pub fn known_recordings<'a>(recordings: &'a [TraceFile], samples: &[Samples<'a>]) -> Result<Vec<Recording<'a>>, Error> {
+    recordings.iter().zip(samples).map(|(recording, samples)| recording.recording(samples)).collect()
+}
+
+/// Returns the name of a file without its path, which is the machine's own business.
+fn file_name(path: &str) -> &str {
+    Path::new(path).file_name().and_then(|name| name.to_str()).unwrap_or(path)
+}
+
+/// Returns the name, in messages, of the header of a recording of which no row has been read yet.
+#[must_use]
+pub fn header(file: &str, line: u64) -> String {
+    if line == 0 { file.to_owned() } else { format!("{file}:{line}") }
+}
+
+/// The joint that metadata describe.
+#[must_use]
+pub fn joint(metadata: &Metadata) -> Option<JointParams> {
+    metadata.joint.map(|joint| JointParams {
+        prestrain: joint.prestrain,
+        moment_arm_mm: joint.moment_arm_mm,
+        gauge_length_mm: joint.gauge_length_mm,
+    })
+}
+
+/// A reading of a trace as a filter takes it.
+#[must_use]
+pub fn reading(reading: &TraceReading) -> Reading {
+    Reading { value: reading.value, sd: reading.sd_ohm.unwrap_or(0.0), saturated: reading.saturated }
+}
+
+/// Unit of readings.
+#[must_use]
+pub const fn unit(kind: ReadingKind) -> ReadingUnit {
+    match kind {
+        ReadingKind::Ohm => ReadingUnit::Ohm,
+        ReadingKind::Ratio => ReadingUnit::Ratio,
+    }
+}
+
+/// The column that readings of a unit stand in.
+#[must_use]
+pub const fn reading_column(unit: ReadingUnit) -> &'static str {
+    match unit {
+        ReadingUnit::Ohm => "resistance_ohm",
+        ReadingUnit::Ratio => "resistance_ratio",
+    }
+}
+
+/// Refuses readings in another unit than the sensor's.
+///
+/// # Errors
+/// They are.
+pub fn check_unit(header: &str, found: ReadingKind, expected: ReadingUnit) -> Result<(), TraceFileError> {
+    let found = unit(found);
+    if found == expected {
+        return Ok(());
+    }
+    let (expected, found) = (reading_column(expected), reading_column(found));
+    Err(TraceFileError::Unit { header: header.to_owned(), expected, found })
+}
+
+/// A doubt in the words of the command line, with the names of its recordings.
+pub fn doubt_text(doubt: &CalibrationDoubt, recordings: &[TraceFile]) -> String {
+    let file = |place: usize| &recordings[place];
+    let places = doubt.recordings();
+    let names = match places[..] {
+        [] => String::new(),
+        [one] => format!("{}: ", file(one).header),
+        _ => places.iter().map(|place| file(*place).name.as_str()).collect::<Vec<_>>().join(" and ") + ": ",
+    };
+    names + &doubt.text(Interface::CommandLine)
+}
+
+/// Lists the rows that take no part in a calibration.
+pub fn distrusted_rows(rows: &[Distrusted], recordings: &[TraceFile]) -> Vec<String> {
+    let line = |one: &Distrusted| {
+        let file = &recordings[one.recording];
+        let row = file.first_row + one.row + 1;
+        format!("{}: data row {row} ({} s): {}; left out of the calibration", file.name, one.time_s, one.doubt)
+    };
+    rows.iter().map(line).collect()
+}
+
+/// Lists the first of them, and how many more there are.
+pub fn first_distrusted_rows(rows: &[Distrusted], recordings: &[TraceFile]) -> Vec<String> {
+    let (first, more) = rows.split_at(rows.len().min(NAMED_ROWS));
+    let rest = (!more.is_empty()).then(|| format!("{} more rows are left out; --explain names all", more.len()));
+    distrusted_rows(first, recordings).into_iter().chain(rest).collect()
+}
