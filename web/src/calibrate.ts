@@ -13,19 +13,27 @@ const ESTIMATORS: [string, string][] = [
   ["hypotheses", "hypotheses"],
 ];
 
-const chosen = { estimator: "auto", from: "", until: "", align: false };
+const chosen = { estimator: "auto", from: "", until: "", align: false, channel: "" };
 let running: Engine | undefined;
 
 /** Draws the step; it is drawn again whenever the recordings change. */
 export function showCalibration(): void {
-  const usable = state.groups.filter((group) => group.recording?.reference);
+  const known = state.groups.filter((group) => group.recording?.reference);
+  const channels = [...new Set(known.map((group) => group.channel))];
+  if (!channels.includes(chosen.channel)) chosen.channel = channels[0] ?? "";
+  const usable = known.filter((group) => group.channel === chosen.channel);
   const start = h("button", { type: "button", class: "main", id: "start", click: () => void calibrate(usable) }, "Calibrate");
   start.disabled = usable.length === 0;
   const align = h("input", { type: "checkbox", checked: chosen.align, change: () => (chosen.align = align.checked) });
+  const choose = (channel: string) => {
+    chosen.channel = channel;
+    showCalibration();
+  };
   byId("calibrate-controls").replaceChildren(
     h(
       "div",
       { class: "fields" },
+      channels.length > 1 && choice("Sensor", channels.map((name) => [name, name || "one channel"]), chosen.channel, choose),
       choice("Estimator", ESTIMATORS, chosen.estimator, (it) => (chosen.estimator = it)),
       field("From, s", chosen.from, (it) => (chosen.from = it), { inputmode: "decimal", placeholder: "start" }),
       field("Until, s", chosen.until, (it) => (chosen.until = it), { inputmode: "decimal", placeholder: "end" }),
@@ -33,7 +41,8 @@ export function showCalibration(): void {
     ),
     usable.length === 0
       ? h("p", { class: "hint" }, "Needs a recording with a reference: strain, displacement or angle.")
-      : h("p", { class: "hint" }, `On ${usable.map((group) => group.recording?.name).join(", ")}.`),
+      : h("p", { class: "hint" }, `On ${usable.map((group) => group.title).join(", ")}.`),
+    ...(channels.length > 1 ? [h("p", { class: "hint" }, "Each channel is a sensor of its own: calibrate one, download what it gives, then the next.")] : []),
     start,
   );
 }

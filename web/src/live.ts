@@ -14,7 +14,7 @@ const BAUDS = ["9600", "19200", "38400", "57600", "115200", "230400", "250000", 
 const LINES_WITHOUT = 8;
 const RAW_LINES = 8;
 /** What comes of a calm stream is taken no more often than this, ms: nobody sees more, and a laptop lasts longer. */
-const CALM_MS = 66;
+const CALM_MS = 90;
 
 const chosen = { baud: "115200", frontEnd: "", recording: "", speed: "1" };
 let source: Source | undefined;
@@ -54,7 +54,7 @@ function player(current: SensorState): HTMLElement {
   const usable = state.groups.filter((group) => group.recording);
   if (usable.length === 0) return h("p", { class: "hint" }, "A recording of step 1 can be played here, too.");
   if (!usable.some((group) => group.id === chosen.recording)) chosen.recording = usable[0]?.id ?? "";
-  const names = usable.map((group): [string, string] => [group.id, group.recording?.name ?? ""]);
+  const names = usable.map((group): [string, string] => [group.id, group.title]);
   const speeds = ["1", "2", "5", "10", "50"].map((it): [string, string] => [it, `${it} ×`]);
   return h(
     "div",

@@ -6,7 +6,7 @@ import { showCalibration } from "./calibrate";
 import { byId, h } from "./dom";
 import { Engine } from "./engine";
 import { restartLive, showLive } from "./live";
-import { type Dropped, Group, show } from "./recordings";
+import { type Dropped, Group, channelOf, show } from "./recordings";
 import { onUse, showRecords } from "./records_view";
 import { state } from "./state";
 import { showUse } from "./use";
@@ -19,9 +19,24 @@ function changed(): void {
   showLive();
 }
 
-function group(files: Dropped[]): Group {
+function group(files: Dropped[], channel = ""): Group {
   made += 1;
-  return new Group(`recording ${made}`, files, () => state.reader(), changed);
+  return new Group(`recording ${made}`, files, () => state.reader(), changed, (one, answers) => void divide(one, answers), channel);
+}
+
+/** Puts a recording of each channel in the place of their files. */
+async function divide(whole: Group, answers: string[]): Promise<void> {
+  const channels = answers.map((answer) => {
+    const one = group(whole.files, channelOf(answer));
+    one.said = whole.said.copy();
+    one.said.answer(answer);
+    return one;
+  });
+  state.groups.splice(state.groups.indexOf(whole), 1, ...channels);
+  await Promise.all(channels.map((one) => one.read()));
+  show(state.groups);
+  changed();
+  for (const one of channels) await one.look();
 }
 
 function say(text: string): void {

@@ -15,7 +15,7 @@ export interface Dropped {
 
 /** Files of one recording, what is said of them, and what was understood. */
 export class Group {
-  readonly said = new Said();
+  said = new Said();
   described: Described | undefined;
   recording: RecordingData | undefined;
   /** Why nothing can be understood. */
@@ -23,12 +23,21 @@ export class Group {
   readonly element = h("article", { class: "card" });
   private readonly survey = h("div");
 
+  /** `channel` is the column of its readings, where the files have several. */
   constructor(
     readonly id: string,
     readonly files: Dropped[],
     private readonly engine: () => Promise<Engine>,
     private readonly changed: () => void,
+    private readonly divide: (group: Group, answers: string[]) => void,
+    readonly channel = "",
   ) {}
+
+  /** Its files, and the channel. */
+  get title(): string {
+    const names = this.files.map((file) => file.name).join(" and ");
+    return this.channel === "" ? names : `${names}, ${this.channel}`;
+  }
 
   /** Reads the files again, with what is said of them. */
   async read(): Promise<void> {
@@ -66,7 +75,7 @@ export class Group {
     const { described } = this;
     const question = described?.question;
     this.element.replaceChildren(
-      h("h3", {}, this.files.map((file) => file.name).join(" and ")),
+      h("h3", {}, this.title),
       ...(this.error ? [h("p", { class: "error", role: "alert" }, this.error)] : []),
       ...(question ? [this.asked(question)] : []),
       ...(this.recording ? [plotOf(this.recording)] : []),
@@ -90,7 +99,10 @@ export class Group {
       else this.say(() => this.said.answer(answer));
     });
     answers.querySelector("select")?.setAttribute("name", "answer");
-    return h("div", { class: "asked" }, text, answers);
+    const isChannel = (answer: string) => channelOf(answer) !== "";
+    const channels = question.answers.every(isChannel) && question.answers.length > 1 ? question.answers : [];
+    const each = h("button", { type: "button", click: () => this.divide(this, channels) }, `A recording of each of the ${channels.length}`);
+    return h("div", { class: "asked" }, text, answers, channels.length > 0 && each);
   }
 
   private say(tell: () => void): void {
@@ -114,7 +126,7 @@ export class Group {
       ...described.files.map((file) => h("p", { class: "hint" }, `${file.name}: ${file.description}`)),
       h(
         "div",
-        { class: "scroll", tabindex: 0, role: "region", "aria-label": "columns of the file" },
+        { class: "scroll", tabindex: 0, role: "region", "aria-label": `columns of ${this.title}` },
         h("table", {}, h("thead", {}, h("tr", {}, ...head)), h("tbody", {}, ...rows)),
       ),
     );
@@ -179,6 +191,11 @@ export class Group {
 
 function remarks(texts: string[]): HTMLElement {
   return h("ul", { class: "remarks" }, ...texts.map((text) => h("li", {}, text)));
+}
+
+/** The column of readings that an answer names; empty if it is another answer. */
+export function channelOf(answer: string): string {
+  return /^--column '?(?:resistance|ratio|adc)=(.+?)'?$/.exec(answer)?.[1] ?? "";
 }
 
 /** Readings, and the reference if there is one. */

@@ -36,9 +36,12 @@ export function showUse(): void {
     byId("firmware").replaceChildren();
     return;
   }
-  const usable = state.groups.filter((group) => group.recording);
+  // A channel's sensor is that of its own recordings.
+  const channel = state.groups.find((group) => group.id === current.calibratedOn)?.channel ?? "";
+  const isOwn = (group: Group) => channel === "" || group.channel === "" || group.channel === channel;
+  const usable = state.groups.filter((group) => group.recording && isOwn(group));
   if (!usable.some((group) => group.id === chosen.recording)) chosen.recording = usable.at(-1)?.id ?? "";
-  const names = usable.map((group): [string, string] => [group.id, group.recording?.name ?? ""]);
+  const names = usable.map((group): [string, string] => [group.id, group.title]);
   const estimate = h("button", { type: "button", class: "main", click: () => void use(current) }, "Filter and smooth");
   estimate.disabled = usable.length === 0;
   place.replaceChildren(

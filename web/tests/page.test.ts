@@ -131,6 +131,33 @@ test("a hundred thousand rows are plotted soon", async () => {
   console.log(`and all that is known of them: ${((performance.now() - start) / 1000).toFixed(2)} s`);
 });
 
+test("several channels are several sensors", async () => {
+  const folder = new Folder();
+  const rows = simulated(folder, 5).split("\n").filter((line) => /^\d/.test(line)).map((line) => line.split(",").map(Number));
+  const second = rows.map(([time, ohm, strain]) => `${time};${ohm};${(0.8 * (ohm ?? 0) + 300).toFixed(2)};${100 * (strain ?? 0)}`);
+  folder.put("two.csv", `Time (s);R left (Ohm);R right (Ohm);Strain (%)\n${second.join("\n")}\n`);
+  const { page } = await open(browser);
+  await drop(page, { name: "two.csv", bytes: folder.get("two.csv") });
+  await page.getByText("A recording of each of the 2").click();
+  await expect.poll(() => page.locator("#recordings .plot canvas").count()).toBe(2);
+  await checkAccess(page);
+  await page.getByLabel("Estimator").selectOption("ekf");
+  for (const channel of ["R left (Ohm)", "R right (Ohm)"]) {
+    await page.locator("#calibrate-controls label", { hasText: "Sensor" }).locator("select").selectOption(channel);
+    await page.locator("#start").click();
+    await page.locator("#verdict").waitFor();
+    folder.run("import", "two.csv", "--column", `resistance=${channel}`, "-o", "two.trace.csv", "--force");
+    folder.run("calibrate", "two.trace.csv", "--estimator", "ekf", "-o", "sensor.toml", "--force");
+    const toml = await download(page, () => page.locator("#save-sensor").click());
+    const law = (text: string) => text.slice(text.indexOf("[law]"), text.indexOf("[[recordings]]"));
+    expect(law(toml.toString())).toBe(law(folder.get("sensor.toml").toString()));
+    // It is filtered with its own readings only.
+    expect(await page.locator("#use-controls option").allTextContents()).toEqual([`two.csv, ${channel}`]);
+    await page.locator("#verdict").evaluate((verdict) => verdict.remove());
+  }
+  await picture(page, "page-channels");
+});
+
 test("a file that is refused is refused in the words of the command line", async () => {
   const folder = new Folder();
   folder.put("picture.csv", Buffer.from([0x89, 0x50, 0x4e, 0x47, 0, 1, 2, 3, 0, 0, 0, 255]));
