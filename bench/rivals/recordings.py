@@ -8,7 +8,7 @@ HALVES = [
     "cbs-slow-sine", "cbs-short-ramps", "cbs-triangles", "cbs-multisine", "cbs-sawtooth", "cbs-four-speeds",
     "nylon-sine", "nylon-triangle", "knee-bend",
 ]  # fmt: skip
-ONE_RIG = ["cbs-slow-sine", "cbs-short-ramps", "cbs-triangles", "cbs-multisine", "cbs-sawtooth"]
+ONE_RIG = ["cbs-multisine", "cbs-sawtooth", "cbs-short-ramps", "cbs-slow-sine", "cbs-triangles"]
 PAIRS = [
     ("nylon-sine", "nylon-triangle"),
     ("cbs-multisine", "cbs-sawtooth"),
