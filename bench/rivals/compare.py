@@ -71,7 +71,7 @@ def rival(made, case):
 
 
 def run(program, *words):
-    """What a command prints, and the processor time that it took."""
+    """Returns the output of a command, and the processor time that it took, s."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     done = subprocess.run([program, "-q", *words], capture_output=True, text=True, check=True)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -90,7 +90,6 @@ def ours(program, case):
             "crps": of["crps_percent_fs"],
             "covered": 100 * of["coverage_95"],
         }
-    static = recording["baselines"]["static_cubic"]["rmse_percent_fs"]
     if case.group == "halves":
         with tempfile.TemporaryDirectory() as folder:
             sensor = f"{folder}/sensor.toml"
@@ -99,7 +98,7 @@ def ours(program, case):
             for name, command in (("filter", "filter"), ("smoother", "smooth")):
                 _, row_s = run(program, command, case.arguments[0], "--sensor", sensor)
                 found[name] |= {"seconds": seconds, "row_us": 1e6 * row_s / len(case.test.truth)}
-    return found, static
+    return found
 
 
 def computed(program, folder, file):
@@ -108,9 +107,7 @@ def computed(program, folder, file):
     for case in cases(folder):
         known = results.setdefault(case.group, {}).setdefault(case.name, {})
         if "filter" not in known:
-            found, static = ours(program, case)
-            known |= found
-            known["static of the program"] = static
+            known |= ours(program, case)
         for name, made in METHODS.items():
             if name not in known:
                 known[name] = rival(made, case)

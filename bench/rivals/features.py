@@ -1,4 +1,4 @@
-"""What methods without a memory of their own are told of the past."""
+"""Features of the past, for methods without a memory of their own."""
 
 import numpy as np
 

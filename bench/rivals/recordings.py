@@ -44,7 +44,7 @@ class Part:
 
 @dataclass
 class Case:
-    """What a method learns from, and the rows on which it is scored; it runs from the first row of that recording on."""
+    """Parts to learn from, and the rows on which a method is scored; it runs from the first row of that recording on."""
 
     group: str
     name: str

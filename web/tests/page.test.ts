@@ -84,7 +84,7 @@ test("a nasty lab file becomes a calibrated sensor and firmware, all as the comm
   console.log(`a lab file to firmware: ${steps.text()}; with the command line beside it ${((performance.now() - started) / 1000).toFixed(0)} s`);
 });
 
-/** What each step of a person's work takes, without what the test does beside it. */
+/** Seconds of each step of a person's work, without those of the test beside it. */
 class Steps {
   readonly #taken: [string, number][] = [];
 

@@ -295,8 +295,7 @@ pub fn reading(reading: &TraceReading) -> Reading {
 }
 
 /// Unit of readings.
-#[must_use]
-pub const fn unit(kind: ReadingKind) -> ReadingUnit {
+const fn unit(kind: ReadingKind) -> ReadingUnit {
     match kind {
         ReadingKind::Ohm => ReadingUnit::Ohm,
         ReadingKind::Ratio => ReadingUnit::Ratio,

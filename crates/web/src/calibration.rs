@@ -111,7 +111,7 @@ fn run(wholes: Vec<TraceFile>, choices: &Choices, progress: Option<&Function>) -
     for ((whole, part), lag_s) in wholes.into_iter().zip(&recordings).zip(lags_s) {
         if part.trace.len() < whole.trace.len() {
             let mut whole = whole;
-            whole.move_reference(lag_s).map_err(told)?;
+            whole.move_reference(lag_s).map_err(text)?;
             kept.push((whole, part.first_row..part.first_row + part.trace.len()));
         }
     }
@@ -151,17 +151,17 @@ fn of_recordings(
     if recordings.is_empty() {
         return Err("expected a recording, found none".into());
     }
-    let samples = recordings.iter().map(TraceFile::samples).collect::<Result<Vec<Samples>, _>>().map_err(told)?;
-    check_alike(recordings).map_err(told)?;
+    let samples = recordings.iter().map(TraceFile::samples).collect::<Result<Vec<Samples>, _>>().map_err(text)?;
+    check_alike(recordings).map_err(text)?;
     let names: Vec<&str> = recordings.iter().map(|recording| recording.name.as_str()).collect();
     let named = |error: &ohmstrain::CalibrationError| match error {
         ohmstrain::CalibrationError::TooFewRows { recording, .. } => format!("{}: {error}", names[*recording]),
         _ => format!("{}: {error}", names.join(", ")),
     };
-    let as_read = known_recordings(recordings, &samples).map_err(told)?;
+    let as_read = known_recordings(recordings, &samples).map_err(text)?;
     heed(recordings, &motion_doubts(&as_read), warnings)?;
     let screened = screen(&samples).map_err(|error| named(&error))?;
-    let known = known_recordings(recordings, &screened.samples()).map_err(told)?;
+    let known = known_recordings(recordings, &screened.samples()).map_err(text)?;
     heed(recordings, &calibration_doubts(&known), warnings)?;
     warnings.extend(first_distrusted_rows(&screened.distrusted, recordings));
     let calibrated = calibration.run_with(&known, |stage| tell(progress, stage)).map_err(|error| match &error {
@@ -172,8 +172,8 @@ fn of_recordings(
     Ok(calibrated)
 }
 
-/// An error as JavaScript gets it.
-fn told(error: impl ToString) -> String {
+/// An error's text.
+fn text(error: impl ToString) -> String {
     error.to_string()
 }
 
