@@ -13,13 +13,15 @@ pub(crate) enum Column {
     Strain,
     DisplacementMm,
     AngleDeg,
+    StrainSd,
+    AngleSd,
     TemperatureC,
 }
 
 impl Column {
     /// All of them.
     #[cfg(feature = "import")]
-    pub(crate) const ALL: [Self; 9] = [
+    pub(crate) const ALL: [Self; 11] = [
         Self::TimeS,
         Self::TimeUs,
         Self::ResistanceOhm,
@@ -28,12 +30,23 @@ impl Column {
         Self::Strain,
         Self::DisplacementMm,
         Self::AngleDeg,
+        Self::StrainSd,
+        Self::AngleSd,
         Self::TemperatureC,
     ];
     const TIMES: [Self; 2] = [Self::TimeS, Self::TimeUs];
     const READINGS: [Self; 3] = [Self::ResistanceOhm, Self::ResistanceRatio, Self::Adc];
     const REFERENCES: [Self; 3] = [Self::Strain, Self::DisplacementMm, Self::AngleDeg];
     const TEMPERATURES: [Self; 1] = [Self::TemperatureC];
+
+    /// Column of the standard deviation of this one.
+    pub(crate) const fn deviation(self) -> Option<Self> {
+        match self {
+            Self::Strain => Some(Self::StrainSd),
+            Self::AngleDeg => Some(Self::AngleSd),
+            _ => None,
+        }
+    }
 
     pub(crate) const fn name(self) -> &'static str {
         match self {
@@ -45,6 +58,8 @@ impl Column {
             Self::Strain => "strain",
             Self::DisplacementMm => "displacement_mm",
             Self::AngleDeg => "angle_deg",
+            Self::StrainSd => "strain_sd",
+            Self::AngleSd => "angle_sd",
             Self::TemperatureC => "temperature_c",
         }
     }
@@ -69,6 +84,7 @@ pub(crate) struct Columns {
     pub time: ColumnPlace,
     pub reading: ColumnPlace,
     pub reference: Option<ColumnPlace>,
+    pub reference_sd: Option<ColumnPlace>,
     pub temperature: Option<ColumnPlace>,
     pub width: usize,
 }
@@ -82,10 +98,13 @@ impl Columns {
                 Fault::new(format!("a header with the column {}", names(group, " or ")), found()).foreign()
             })
         };
+        let reference = at_most_one(&Column::REFERENCES)?;
+        let deviation = reference.and_then(|place| place.column.deviation());
         Ok(Self {
             time: exactly_one(&Column::TIMES)?,
             reading: exactly_one(&Column::READINGS)?,
-            reference: at_most_one(&Column::REFERENCES)?,
+            reference,
+            reference_sd: deviation.map_or(Ok(None), |column| at_most_one(&[column]))?,
             temperature: at_most_one(&Column::TEMPERATURES)?,
             width: header.len(),
         })

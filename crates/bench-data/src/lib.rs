@@ -48,6 +48,7 @@ mod line_parser;
 mod lines;
 mod metadata;
 mod order;
+pub mod pacing;
 #[cfg(feature = "import")]
 mod parquet_text;
 mod reader;

@@ -40,6 +40,8 @@ pub struct Row {
     pub reading: Reading,
     /// Reference, see [`reference_quantity`](crate::TraceReader::reference_quantity); NaN if missing.
     pub reference: f64,
+    /// Standard deviation of the reference; NaN if the reference is missing or exact.
+    pub reference_sd: f64,
     /// Temperature, °C; NaN if missing.
     pub temperature_c: f64,
 }

@@ -4,7 +4,7 @@ use ohmstrain_model::{AdcCode, FrontEnd, Joint};
 use crate::cell;
 use crate::clock::{Clock, LastTime};
 use crate::columns::{Column, ColumnPlace, Columns};
-use crate::error::Fault;
+use crate::error::{Fault, quote};
 use crate::metadata::{Metadata, ResistanceUnit, StrainUnit};
 use crate::row::{Reading, ReadingKind, ReferenceQuantity, Row};
 
@@ -63,13 +63,15 @@ impl RowParser {
             return Err(Fault::new(expected, format!("{}", record.len())));
         }
         let temperature = self.columns.temperature.as_ref();
+        let (reference, reference_sd) = match &self.columns.reference {
+            Some(place) => self.conversion.reference(place, self.columns.reference_sd.as_ref(), record)?,
+            None => (f64::NAN, f64::NAN),
+        };
         Ok(Row {
             line,
+            reference,
+            reference_sd,
             reading: self.conversion.reading(&self.columns.reading, record)?,
-            reference: match &self.columns.reference {
-                Some(place) => self.conversion.reference(place, record)?,
-                None => f64::NAN,
-            },
             temperature_c: match temperature {
                 Some(place) => cell::number(place.column.name(), place.cell(record))?,
                 None => f64::NAN,
@@ -119,13 +121,32 @@ impl Conversion {
         })
     }
 
-    fn reference(&self, place: &ColumnPlace, record: &StringRecord) -> Result<f64, Fault> {
+    /// The reference, and its standard deviation if there is a column for it.
+    fn reference(
+        &self,
+        place: &ColumnPlace,
+        sd: Option<&ColumnPlace>,
+        record: &StringRecord,
+    ) -> Result<(f64, f64), Fault> {
         let value = cell::number(place.column.name(), place.cell(record))?;
-        Ok(match (place.column, &self.joint) {
+        let converted = |value: f64| match (place.column, &self.joint) {
             (Column::DisplacementMm, _) => value / self.gauge_length_mm,
             (Column::Strain, _) => self.strain_factor * value,
             (Column::AngleDeg, Some(joint)) => joint.strain(value.to_radians()),
             _ => value,
-        })
+        };
+        let Some(sd) = sd.filter(|_| value.is_finite()) else { return Ok((converted(value), f64::NAN)) };
+        let (name, text) = (sd.column.name(), sd.cell(record));
+        let sd = cell::number(name, text)?;
+        // A missing one is none either.
+        if !(sd > 0.0) {
+            return Err(Fault::in_column(name, "a positive standard deviation beside a known reference", quote(text)));
+        }
+        let sd = match (place.column, &self.joint) {
+            (Column::AngleDeg, Some(_)) => 0.5 * (converted(value + sd) - converted(value - sd)).abs(),
+            (Column::Strain, _) => self.strain_factor * sd,
+            _ => sd,
+        };
+        Ok((converted(value), sd))
     }
 }

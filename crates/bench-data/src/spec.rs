@@ -175,10 +175,10 @@ fn impossible(error: ParameterError, text: &str) -> SpecError {
 }
 
 /// `key=value` pairs separated by blanks.
-struct Pairs<'a>(Vec<(&'a str, &'a str)>);
+pub(crate) struct Pairs<'a>(Vec<(&'a str, &'a str)>);
 
 impl<'a> Pairs<'a> {
-    fn parse(text: &'a str, known: &[&str]) -> Result<Self, SpecError> {
+    pub(crate) fn parse(text: &'a str, known: &[&str]) -> Result<Self, SpecError> {
         let mut pairs: Vec<(&str, &str)> = Vec::new();
         for word in text.split_whitespace() {
             let wanted = || format!("`key=value` with the key one of {}", known.join(", "));
@@ -210,7 +210,7 @@ impl<'a> Pairs<'a> {
         }
     }
 
-    fn number_or(&self, key: &str, default: f64) -> Result<f64, SpecError> {
+    pub(crate) fn number_or(&self, key: &str, default: f64) -> Result<f64, SpecError> {
         if self.find(key).is_some() { self.number(key) } else { Ok(default) }
     }
 

@@ -39,6 +39,8 @@ pub struct Reference {
     pub quantity: ReferenceQuantity,
     /// The values; NaN is a missing one.
     pub values: Vec<f64>,
+    /// Standard deviations of the values that are not missing; empty if they are exact.
+    pub sd: Vec<f64>,
 }
 
 /// A recording: readings over time, perhaps with a reference. All vectors have the same length.
@@ -95,7 +97,11 @@ impl Trace {
                 values: Vec::new(),
                 converter: rows.has_codes().then(ConverterReadings::default),
             },
-            reference: rows.reference_quantity().map(|quantity| Reference { quantity, values: Vec::new() }),
+            reference: rows.reference_quantity().map(|quantity| Reference {
+                quantity,
+                values: Vec::new(),
+                sd: Vec::new(),
+            }),
             temperature_c: rows.has_temperature().then(Vec::new),
         }
     }
@@ -110,6 +116,10 @@ impl Trace {
         }
         if let Some(reference) = &mut self.reference {
             reference.values.push(row.reference);
+            if row.reference_sd.is_finite() || !reference.sd.is_empty() {
+                reference.sd.resize(reference.values.len() - 1, f64::NAN);
+                reference.sd.push(row.reference_sd);
+            }
         }
         if let Some(temperature) = &mut self.temperature_c {
             temperature.push(row.temperature_c);
@@ -159,10 +169,11 @@ impl Trace {
                     saturated: cut(&converter.saturated, &range),
                 }),
             },
-            reference: self
-                .reference
-                .as_ref()
-                .map(|reference| Reference { quantity: reference.quantity, values: cut(&reference.values, &range) }),
+            reference: self.reference.as_ref().map(|reference| Reference {
+                quantity: reference.quantity,
+                values: cut(&reference.values, &range),
+                sd: cut(&reference.sd, &range),
+            }),
             temperature_c: self.temperature_c.as_ref().map(|values| cut(values, &range)),
         }
     }

@@ -36,8 +36,10 @@ impl Trace {
             ReferenceQuantity::Strain => Column::Strain,
             ReferenceQuantity::AngleDeg => Column::AngleDeg,
         });
+        let has_sd = self.reference.as_ref().is_some_and(|reference| !reference.sd.is_empty());
+        let deviation = reference.filter(|_| has_sd).and_then(Column::deviation);
         let temperature = self.temperature_c.as_ref().map(|_| Column::TemperatureC);
-        [Some(Column::TimeS), Some(reading), reference, temperature].into_iter().flatten().collect()
+        [Some(Column::TimeS), Some(reading), reference, deviation, temperature].into_iter().flatten().collect()
     }
 
     fn write_row(&self, row: usize, rows: &mut RowWriter<impl Write>) -> io::Result<()> {
@@ -49,8 +51,8 @@ impl Trace {
                 None => self.readings.values[row],
             },
         );
-        let reference = self.reference.as_ref().map(|reference| &reference.values);
-        for values in reference.into_iter().chain(&self.temperature_c) {
+        let reference = self.reference.iter().flat_map(|reference| [&reference.values, &reference.sd]);
+        for values in reference.filter(|values| !values.is_empty()).chain(&self.temperature_c) {
             number(rows, values[row]);
         }
         rows.end()

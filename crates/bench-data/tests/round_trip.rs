@@ -75,23 +75,24 @@ fn converted(front_end: &FrontEndSpec, codes: Vec<Option<u32>>) -> Readings {
     Readings { kind: ReadingKind::Ohm, values, converter: Some(converter) }
 }
 
-/// Readings, reference, temperature and code of one row.
-type Cells = (f64, f64, f64, Option<u32>, f64);
+/// Readings, reference, temperature, the reference's deviation, code and step of one row.
+type Cells = (f64, f64, f64, f64, Option<u32>, f64);
 
 fn trace() -> impl Strategy<Value = Trace> {
     let row = (
         maybe_missing(1e-3..1e9_f64),
         maybe_missing(-1.0..2.0_f64),
         maybe_missing(-40.0..90.0_f64),
+        1e-6..1.0_f64,
         option::weighted(0.9, 0..300_u32),
         1e-6..10.0_f64,
     );
-    let shape = (0..3_usize, 0..3_usize, any::<bool>(), -1e3..1e6_f64);
-    (metadata(), vec(row, 1..40), shape).prop_map(|(mut metadata, rows, (kind, quantity, warm, start))| {
+    let shape = (0..3_usize, 0..3_usize, any::<bool>(), any::<bool>(), -1e3..1e6_f64);
+    (metadata(), vec(row, 1..40), shape).prop_map(|(mut metadata, rows, (kind, quantity, warm, exact, start))| {
         let column = |pick: fn(&Cells) -> f64| rows.iter().map(pick).collect::<Vec<f64>>();
         let plain = |kind| Readings { kind, values: column(|row| row.0), converter: None };
         let readings = match (kind, &metadata.front_end) {
-            (0, Some(front_end)) => converted(front_end, rows.iter().map(|row| row.3).collect()),
+            (0, Some(front_end)) => converted(front_end, rows.iter().map(|row| row.4).collect()),
             (1, _) => plain(ReadingKind::Ratio),
             _ => plain(ReadingKind::Ohm),
         };
@@ -99,12 +100,17 @@ fn trace() -> impl Strategy<Value = Trace> {
             // With a joint an angle is read as strain.
             metadata.joint = None;
         }
-        let reference = [Some(ReferenceQuantity::Strain), Some(ReferenceQuantity::AngleDeg), None][quantity]
-            .map(|quantity| Reference { quantity, values: column(|row| row.1) });
+        let reference =
+            [Some(ReferenceQuantity::Strain), Some(ReferenceQuantity::AngleDeg), None][quantity].map(|quantity| {
+                let sd = rows.iter().map(|row| if row.1.is_nan() { f64::NAN } else { row.3 });
+                let none_known = rows.iter().all(|row| row.1.is_nan());
+                let sd = if exact || none_known { Vec::new() } else { sd.collect() };
+                Reference { quantity, values: column(|row| row.1), sd }
+            });
         let time_s = rows
             .iter()
             .scan(start, |time, row| {
-                *time += row.4;
+                *time += row.5;
                 Some(*time)
             })
             .collect();

@@ -1,6 +1,9 @@
 //! Seeds, settings, disturbances and what the recordings look like.
 
-use ohmstrain_bench_data::simulate::{Disturbances, Material, Protocol, SimulationSettings, simulate};
+use ohmstrain_bench_data::pacing::{PacedStep, Pacing, Position};
+use ohmstrain_bench_data::simulate::{
+    Disturbances, Followed, Material, Person, Protocol, SettingsError, SimulationSettings, simulate,
+};
 use ohmstrain_bench_data::{FrontEndSpec, ReadingKind, ReferenceQuantity, Trace, segment};
 use ohmstrain_model::Phase::{self, Extend, Hold, Retract};
 
@@ -205,4 +208,70 @@ fn names_are_read_back() {
         assert_eq!(protocol.name().parse::<Protocol>(), Ok(protocol));
     }
     assert!("latex".parse::<Material>().is_err() && "wiggle".parse::<Protocol>().is_err());
+}
+
+/// Rest, to a position in 2 s and hold for 8 s, eight times to and fro.
+fn followed(values: [f64; 2], quantity: ReferenceQuantity, person: Person) -> SimulationSettings {
+    let position = |value: f64| Position { name: value.to_string(), values: vec![value], sd: 0.01 };
+    let mut steps = vec![PacedStep { to: 0, move_s: 0.0, hold_s: 10.0 }];
+    steps.extend((0..16).map(|k| PacedStep { to: (k + 1) % 2, move_s: 2.0, hold_s: 8.0 }));
+    let pacing = Pacing { quantity, joints: vec![], positions: values.map(position).to_vec(), steps };
+    let followed = Some(Followed { pacing, joint: 0, person });
+    SimulationSettings { followed, ..settings(SHORT_HOLD) }
+}
+
+/// Strain in the middle of each hold but the first.
+fn held(trace: &Trace) -> Vec<f64> {
+    (0..16).map(|k| strain(trace)[20 * (10 + 10 * k + 6)]).collect()
+}
+
+#[test]
+fn a_person_follows_a_protocol_late_and_reaches_its_positions() {
+    let exact = Person { mark_sd: 0.0, missed: 0.0, cut_short: 0.0 };
+    let trace = simulate(&followed([0.0, 0.2], ReferenceQuantity::Strain, exact)).unwrap();
+    assert_eq!(trace.time_s.last(), Some(&170.0));
+    let positions: Vec<f64> = (0..16).map(|k| if k % 2 == 0 { 0.2 } else { 0.0 }).collect();
+    assert_eq!(held(&trace), positions);
+    // A cue is at a multiple of ten seconds; nobody acts on it sooner than in 0.15 s, and everybody has moved in 2 s.
+    for cue in 1..17 {
+        let at = |seconds: f64| strain(&trace)[(20.0 * (10.0 * f64::from(cue) + seconds)) as usize];
+        assert_eq!(at(0.1), at(-0.5));
+        assert!((at(2.0) - at(0.1)).abs() > 0.05, "{cue}");
+    }
+    // Angles bend the sensor to its full stretch, and are the reference.
+    let angles = simulate(&followed([0.0, 90.0], ReferenceQuantity::AngleDeg, exact)).unwrap();
+    assert_eq!(angles.reference.as_ref().unwrap().quantity, ReferenceQuantity::AngleDeg);
+    assert_eq!(held(&angles)[0], 90.0);
+}
+
+#[test]
+fn a_person_errs_as_much_as_is_said() {
+    let person = Person { mark_sd: 0.05, missed: 0.0, cut_short: 0.0 };
+    let mut squares = Vec::new();
+    for seed in 0..60 {
+        let settings = SimulationSettings { seed, ..followed([0.1, 0.3], ReferenceQuantity::Strain, person) };
+        let trace = simulate(&settings).unwrap();
+        let errors = held(&trace).into_iter().enumerate().map(|(k, x)| x - if k % 2 == 0 { 0.3 } else { 0.1 });
+        squares.extend(errors.map(|error| error * error));
+    }
+    // 0.05 of a span of 0.2. Half of the variance is the same in a recording's visits of a position: of 120 draws a variance is known to
+    // 13 %, so that three deviations are a fifth of the standard deviation.
+    let sd = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+    assert!((sd / 0.01 - 1.0).abs() < 0.2, "{sd}");
+    let missing = Person { mark_sd: 0.0, missed: 0.3, cut_short: 0.0 };
+    let trace = simulate(&followed([0.0, 0.2], ReferenceQuantity::Strain, missing)).unwrap();
+    let stayed = held(&trace).windows(2).filter(|pair| pair[0] == pair[1]).count();
+    assert!((1..15).contains(&stayed), "{stayed}");
+    let hasty = Person { mark_sd: 0.0, missed: 0.0, cut_short: 1.0 };
+    let trace = simulate(&followed([0.0, 0.2], ReferenceQuantity::Strain, hasty)).unwrap();
+    let at_end = strain(&trace)[20 * 20 - 1];
+    assert!((0.05..0.15).contains(&at_end), "{at_end}");
+}
+
+#[test]
+fn positions_that_no_sensor_reaches_are_refused() {
+    let usual = Person::default();
+    let far = simulate(&followed([0.0, 0.7], ReferenceQuantity::Strain, usual));
+    assert!(matches!(far, Err(SettingsError::OutOfRange { setting: "strain of a position", .. })), "{far:?}");
+    assert!("mark_sd=2".parse::<Person>().is_err() && "missed=0.1".parse::<Person>().is_ok());
 }

@@ -10,6 +10,8 @@ mod fleet;
 mod hand;
 mod live;
 mod plan;
+mod port;
+mod record;
 mod refine;
 mod serial_check;
 mod serve;
@@ -32,6 +34,8 @@ pub use fleet::{FleetArgs, FleetCommand, FleetFitArgs};
 pub use hand::HandArgs;
 pub use live::LiveArgs;
 pub use plan::PlanArgs;
+pub use port::PortArgs;
+pub use record::RecordArgs;
 pub use refine::RefineArgs;
 pub use serial_check::SerialCheckArgs;
 pub use serve::ServeArgs;
@@ -104,6 +108,12 @@ pub enum Command {
     /// Say what a recording should contain, and what sampling and converter will be worth
     #[command(before_help = "Example: ohmstrain plan --material ecoflex-00-30")]
     Plan(PlanArgs),
+    /// Pace a person through a protocol while readings are recorded: the strain is known where the body is held
+    #[command(
+        before_help = "Example: ohmstrain record --port /dev/ttyACM0 --protocol protocol.toml -o trace.csv",
+        after_help = "Before: ohmstrain plan --angles 'flat=0 half=45 fist=90' -o protocol.toml\nThen: ohmstrain calibrate trace.csv -o sensor.toml"
+    )]
+    Record(RecordArgs),
     /// Simulate a recording of the bench
     #[command(before_help = "Example: ohmstrain simulate --protocol mixed --speed-mm-s 5 -o trace.csv")]
     Simulate(SimulateArgs),

@@ -2,8 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use ohmstrain::ReadingUnit;
-use ohmstrain::trace::{TraceFile, reading_column};
+use ohmstrain::trace::TraceFile;
 use ohmstrain_bench_data::{Metadata, ParquetText};
 
 use crate::error::CliError;
@@ -11,7 +10,9 @@ use crate::input;
 use crate::whole_file;
 
 /// Columns that a recording of one channel has its readings in.
-const ONE_CHANNEL: [&str; 3] = ["resistance_ohm", "resistance_ratio", "adc"];
+pub const ONE_CHANNEL: [&str; 3] = ["resistance_ohm", "resistance_ratio", "adc"];
+/// Endings of a column of readings, with the column that they are in a recording of one channel.
+const READINGS: [(&str, &str); 3] = [("_ohm", "resistance_ohm"), ("_ratio", "resistance_ratio"), ("_adc", "adc")];
 /// Endings of a reference's column, with the column that it is in a recording of one channel.
 const REFERENCES: [(&str, &str); 4] =
     [("angle_deg", "angle_deg"), ("strain", "strain"), ("displacement_mm", "displacement_mm"), ("deg", "angle_deg")];
@@ -33,7 +34,8 @@ pub struct Channel {
     pub column: String,
     /// The name without its unit.
     pub name: String,
-    pub unit: ReadingUnit,
+    /// The column that it is in a recording of one channel.
+    known: &'static str,
     /// The column of its reference.
     pub reference: String,
 }
@@ -69,7 +71,7 @@ impl Table {
             .collect()
     }
 
-    fn channel(&self, (column, (name, unit)): (&String, (&str, ReadingUnit))) -> Result<Channel, CliError> {
+    fn channel(&self, (column, (name, known)): (&String, (&str, &'static str))) -> Result<Channel, CliError> {
         let references = || self.columns.iter().filter(|column| reference(column).is_some());
         let is_own = |found: &&String| reference(found).is_some_and(|(stem, _)| stem == name);
         let is_of_all = |found: &&String| reference(found).is_some_and(|(stem, _)| stem.is_empty());
@@ -84,19 +86,23 @@ impl Table {
                 self.header_name()
             )));
         };
-        Ok(Channel { column: column.clone(), name: name.into(), unit, reference: found.clone() })
+        Ok(Channel { column: column.clone(), name: name.into(), known, reference: found.clone() })
     }
 
     /// The recording of one channel.
     pub fn trace(&self, channel: &Channel, overrides: &Metadata) -> Result<TraceFile, CliError> {
-        let own = reading_column(channel.unit);
+        let own = channel.known;
         let known = reference(&channel.reference).map_or("_", |(_, known)| known);
+        let sd = deviation(&channel.reference);
+        let known_sd = deviation(known).unwrap_or_default();
         let name = |column: &String| -> String {
             let kept = ["time_s", "time_us", "temperature_c"].contains(&column.as_str());
             let name = if *column == channel.column {
                 own
             } else if *column == channel.reference {
                 known
+            } else if Some(column) == sd.as_ref() {
+                known_sd.as_str()
             } else if kept {
                 column
             } else {
@@ -125,10 +131,9 @@ impl Table {
     }
 }
 
-/// The name of a column of readings without its unit, and the unit.
-fn reading(column: &str) -> Option<(&str, ReadingUnit)> {
-    let units = [("_ohm", ReadingUnit::Ohm), ("_ratio", ReadingUnit::Ratio)];
-    let found = units.into_iter().find_map(|(ending, unit)| Some((column.strip_suffix(ending)?, unit)));
+/// The name of a column of readings without its unit, and its column in a recording of one channel.
+pub fn reading(column: &str) -> Option<(&str, &'static str)> {
+    let found = READINGS.into_iter().find_map(|(ending, known)| Some((column.strip_suffix(ending)?, known)));
     found.filter(|(name, _)| !name.is_empty())
 }
 
@@ -141,6 +146,18 @@ pub fn reference(column: &str) -> Option<(&str, &'static str)> {
         stem.filter(|stem| !stem.is_empty() || ending == known).map(|stem| (stem, *known))
     };
     REFERENCES.iter().find_map(of)
+}
+
+/// Name of the column of a reference's standard deviation: `index_angle_sd` of `index_angle_deg`, `strain_sd` of `strain`.
+fn deviation(reference: &str) -> Option<String> {
+    let angle = reference.strip_suffix("angle_deg").map(|stem| format!("{stem}angle_sd"));
+    angle.or_else(|| reference.strip_suffix("strain").map(|stem| format!("{stem}strain_sd")))
+}
+
+/// True if a column is a reference, or the standard deviation of one.
+pub fn is_reference(column: &str) -> bool {
+    let of = |ending: &str| column.strip_suffix(ending).is_some_and(|stem| stem.is_empty() || stem.ends_with('_'));
+    reference(column).is_some() || of("angle_sd") || of("strain_sd")
 }
 
 /// Beginning and end of the first line that is neither empty nor a comment.
@@ -158,7 +175,7 @@ fn header(bytes: &[u8]) -> Option<(usize, usize)> {
 
 #[cfg(test)]
 mod tests {
-    use super::{header, reading, reference};
+    use super::{deviation, header, is_reference, reading, reference};
 
     #[test]
     fn columns_are_told_by_their_endings() {
@@ -169,6 +186,9 @@ mod tests {
         assert_eq!(reference("index_deg"), Some(("index", "angle_deg")));
         assert_eq!(reference("index_strain"), Some(("index", "strain")));
         assert!(reference("deg").is_none() && reference("restrain").is_none());
+        assert_eq!(deviation("index_angle_deg").as_deref(), Some("index_angle_sd"));
+        assert_eq!(deviation("strain").as_deref(), Some("strain_sd"));
+        assert!(deviation("index_deg").is_none() && is_reference("index_strain_sd") && !is_reference("index_sd"));
     }
 
     #[test]

@@ -82,6 +82,16 @@ fn filter() {
     holds(&run("filter.md"), &["estimates.csv", "smoothed.csv", "hand.toml", "hand-thumb.toml", "strains.csv"]);
 }
 
+/// Five fingers that were calibrated on what a person does know their angles on another day.
+#[test]
+fn glove() {
+    let folder = run("glove.md");
+    holds(&folder, &["glove.csv", "hand.toml", "hand-thumb.toml", "angles.csv"]);
+    let text = fs::read_to_string(folder.path().join("glove.csv")).unwrap();
+    let header = text.lines().find(|line| line.starts_with("time_s")).unwrap();
+    assert!(header.starts_with("time_s,thumb_ohm,index_ohm,") && header.ends_with(",little_angle_deg,little_angle_sd"));
+}
+
 /// Both sketches compile: the new one with the library that the page exports.
 #[test]
 fn replace_map() {

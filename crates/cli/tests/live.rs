@@ -1,124 +1,20 @@
 //! `live` in a terminal of its own, on a serial port that is the other end of a pseudo-terminal.
 #![cfg(unix)]
 
-use std::io::{Read, Write};
+use std::io::Write;
 use std::net::{TcpListener, UdpSocket};
-use std::num::NonZero;
-use std::os::unix::fs::symlink;
 use std::path::Path;
-use std::sync::{Arc, Mutex};
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
+use crate::common::terminal::{Port, Terminal};
 use crate::common::{Bench, Csv};
 use assert_cmd::cargo::cargo_bin;
-use portable_pty::{Child, CommandBuilder, MasterPty, PtyPair, PtySize, native_pty_system};
 
-/// Longer than anything takes on a busy machine.
-const PATIENCE: Duration = Duration::from_secs(60);
-
-fn pair(rows: u16, cols: u16) -> PtyPair {
-    native_pty_system().openpty(PtySize { rows, cols, pixel_width: 0, pixel_height: 0 }).unwrap()
-}
-
-fn cells(count: u16) -> NonZero<u16> {
-    NonZero::new(count).unwrap()
-}
-
-/// The program on a terminal.
-struct Terminal {
-    master: Box<dyn MasterPty + Send>,
-    keys: Box<dyn Write + Send>,
-    screen: Arc<Mutex<vt100::Parser>>,
-    child: Box<dyn Child + Send + Sync>,
-}
-
-impl Terminal {
-    fn new(bench: &Bench, program: &Path, arguments: &[&str]) -> Self {
-        let pair = pair(30, 110);
-        let mut command = CommandBuilder::new(program);
-        command.cwd(bench.path(""));
-        command.args(arguments);
-        command.env("TERM", "xterm");
-        let child = pair.slave.spawn_command(command).unwrap();
-        drop(pair.slave);
-        let screen = Arc::new(Mutex::new(vt100::Parser::new(cells(30), cells(110), 0)));
-        let (mut output, drawn) = (pair.master.try_clone_reader().unwrap(), Arc::clone(&screen));
-        thread::spawn(move || {
-            let mut bytes = [0; 4096];
-            while let Ok(count @ 1..) = output.read(&mut bytes) {
-                drawn.lock().unwrap().process(&bytes[..count]);
-            }
-        });
-        let keys = pair.master.take_writer().unwrap();
-        Self { master: pair.master, keys, screen, child }
-    }
-
-    /// `live` with the bench's sensor.
-    fn live(bench: &Bench, port: &str, more: &[&str]) -> Self {
-        let arguments = [&["live", "--port", port, "--sensor", "sensor.toml"], more].concat();
-        Self::new(bench, cargo_bin!("ohmstrain"), &arguments)
-    }
-
-    fn text(&self) -> String {
-        self.screen.lock().unwrap().screen().contents()
-    }
-
-    #[track_caller]
-    fn wait_for(&self, words: &str) {
-        let start = Instant::now();
-        while !self.text().contains(words) {
-            assert!(start.elapsed() < PATIENCE, "no `{words}` on\n{}", self.text());
-            thread::sleep(Duration::from_millis(20));
-        }
-    }
-
-    fn press(&mut self, key: &str) {
-        self.keys.write_all(key.as_bytes()).unwrap();
-    }
-
-    fn resize(&self, rows: u16, cols: u16) {
-        self.screen.lock().unwrap().screen_mut().set_size(cells(rows), cells(cols));
-        self.master.resize(PtySize { rows, cols, pixel_width: 0, pixel_height: 0 }).unwrap();
-    }
-
-    /// Leaves; what stands on the terminal then.
-    #[track_caller]
-    fn quit(mut self) -> String {
-        self.press("q");
-        let start = Instant::now();
-        let status = loop {
-            if let Some(status) = self.child.try_wait().unwrap() {
-                break status;
-            }
-            assert!(start.elapsed() < PATIENCE, "still there:\n{}", self.text());
-            thread::sleep(Duration::from_millis(20));
-        };
-        assert_eq!(status.exit_code(), 0, "{}", self.text());
-        self.wait_for(" rows, ");
-        assert!(!self.screen.lock().unwrap().screen().alternate_screen());
-        self.text()
-    }
-}
-
-/// A serial port's other end.
-struct Port {
-    device: Box<dyn Write + Send>,
-    _pair: PtyPair,
-}
-
-impl Port {
-    /// Plugs it in where `path` points.
-    fn plug_in(path: &Path) -> Self {
-        let pair = pair(24, 80);
-        let _ = std::fs::remove_file(path);
-        symlink(pair.master.tty_name().unwrap(), path).unwrap();
-        Self { device: pair.master.take_writer().unwrap(), _pair: pair }
-    }
-
-    fn send(&mut self, text: &str) {
-        self.device.write_all(text.as_bytes()).unwrap();
-    }
+/// `live` with the bench's sensor.
+fn live(bench: &Bench, port: &str, more: &[&str]) -> Terminal {
+    let arguments = [&["live", "--port", port, "--sensor", "sensor.toml"], more].concat();
+    Terminal::new(bench, cargo_bin!("ohmstrain"), &arguments)
 }
 
 /// Returns the terminal's line for a row of `filter`.
@@ -182,7 +78,7 @@ fn lines_from_a_port_are_filtered_at_real_speed_and_faster() {
     let head = lines.iter().position(|line| line.starts_with("time_s")).unwrap() + 1;
     let port_path = bench.path("port");
     let mut port = Port::plug_in(&port_path);
-    let terminal = Terminal::live(&bench, "port", &[]);
+    let terminal = live(&bench, "port", &[]);
     terminal.wait_for("connected");
     port.send(&(lines[..head].join("\r\n") + "\r\n"));
     // Five readings per second, as the recording has them.
@@ -206,7 +102,7 @@ fn lines_from_a_port_are_filtered_at_real_speed_and_faster() {
 fn garbage_resizing_and_unplugging_stop_nothing() {
     let bench = Bench::calibrated();
     let port_path = bench.path("port");
-    let terminal = Terminal::live(&bench, "port", &["--header", "time_s,resistance_ohm"]);
+    let terminal = live(&bench, "port", &["--header", "time_s,resistance_ohm"]);
     terminal.wait_for("waiting for the port");
     let mut port = Port::plug_in(&port_path);
     terminal.wait_for("connected");
@@ -250,7 +146,7 @@ fn garbage_resizing_and_unplugging_stop_nothing() {
 #[test]
 fn a_recording_is_played_back_recorded_marked_and_zeroed() {
     let bench = Bench::calibrated();
-    let mut terminal = Terminal::live(&bench, "trace.csv", &["--speed", "20"]);
+    let mut terminal = live(&bench, "trace.csv", &["--speed", "20"]);
     // 5 rows per second, twenty times as fast.
     terminal.wait_for("at 5.0/s");
     terminal.press("r");
@@ -305,14 +201,14 @@ fn readings_on_stdin_leave_the_keys_to_the_terminal() {
 #[test]
 fn the_keyboard_is_no_port() {
     let bench = Bench::calibrated();
-    let mut terminal = Terminal::live(&bench, "-", &[]);
+    let mut terminal = live(&bench, "-", &[]);
     terminal.wait_for("stdin is the terminal: pipe readings into it");
     assert_eq!(terminal.child.wait().unwrap().exit_code(), 2);
-    let mut terminal = Terminal::live(&bench, ".", &[]);
+    let mut terminal = live(&bench, ".", &[]);
     terminal.wait_for("cannot read .: ");
     assert_eq!(terminal.child.wait().unwrap().exit_code(), 1);
     bench.write("trace.csv.gz", b"\x1f\x8b\x08\x00");
-    let mut terminal = Terminal::live(&bench, "trace.csv.gz", &[]);
+    let mut terminal = live(&bench, "trace.csv.gz", &[]);
     terminal.wait_for("`ohmstrain import trace.csv.gz -o trace.csv`");
     assert_eq!(terminal.child.wait().unwrap().exit_code(), 4);
 }
@@ -322,7 +218,7 @@ fn a_pipe_is_read_again_when_another_program_writes_into_it() {
     let bench = Bench::calibrated();
     let pipe = bench.path("pipe");
     assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
-    let mut terminal = Terminal::live(&bench, "pipe", &["--header", "time_s,resistance_ohm"]);
+    let mut terminal = live(&bench, "pipe", &["--header", "time_s,resistance_ohm"]);
     terminal.wait_for("no reading yet");
     terminal.press("r");
     terminal.wait_for("there is nothing to record yet");

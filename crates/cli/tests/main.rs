@@ -34,6 +34,7 @@ mod marks;
 mod outputs;
 mod own_files;
 mod pipeline;
+mod record;
 mod refine;
 mod resumed;
 mod rows_out;

@@ -2,13 +2,14 @@
 
 use crate::common::{Bench, SIMULATE, files_in};
 
-const COMMANDS: [&str; 21] = [
+const COMMANDS: [&str; 22] = [
     "demo",
     "example",
     "serve",
     "inspect",
     "import",
     "plan",
+    "record",
     "simulate",
     "calibrate",
     "refine",

@@ -1,10 +1,10 @@
 //! Calibration, with its progress, as `ohmstrain calibrate` does it.
 
 use js_sys::{Date, Function, JSON};
-use ohmstrain::trace::{TraceFile, check_alike, first_distrusted_rows, known_recordings};
+use ohmstrain::trace::{Marked, TraceFile, check_alike, first_distrusted_rows, known_recordings, take_marks};
 use ohmstrain::{
-    Calibration, Closing, EstimatorKind, GaugeFamily, Kept, LeftOutRow, Stage, Tested, calibration_doubts,
-    motion_doubts,
+    Calibration, CalibrationError, Closing, Error, EstimatorKind, GaugeFamily, Kept, LeftOutRow, Stage, Tested,
+    calibration_doubts, motion_doubts,
 };
 use ohmstrain_calib::{Samples, screen};
 use serde::Deserialize;
@@ -102,8 +102,19 @@ fn run(wholes: Vec<TraceFile>, choices: &Choices, progress: Option<&Function>) -
         recordings.push(part);
     }
     let mut warnings = Vec::new();
-    let lags_s = recordings.iter_mut().map(|one| on_one_clock(one, choices.align, &mut warnings));
-    let lags_s: Vec<f64> = lags_s.collect::<Result<_, _>>()?;
+    let own = recordings.iter().enumerate().filter_map(|(place, one)| Marked::of_trace(place, one));
+    let marked: Vec<Marked> = own.collect();
+    let mut lags_s = vec![0.0; recordings.len()];
+    for (place, recording) in recordings.iter_mut().enumerate() {
+        if marked.iter().all(|one| one.recording != place) {
+            lags_s[place] = on_one_clock(recording, choices.align, &mut warnings)?;
+        }
+    }
+    let found = take_marks(&mut recordings, &marked).map_err(|error| match error {
+        Error::Calibration(CalibrationError::Marks { recording, source }) => marked[recording].fault(&source),
+        other => other.to_string(),
+    })?;
+    warnings.extend(marked.iter().zip(&found).map(|(one, found)| one.remark(found)));
     let start_ms = Date::now();
     let calibrated = of_recordings(&recordings, choices.calibration()?, progress, &mut warnings)?;
     let calibration_s = (Date::now() - start_ms) / 1e3;

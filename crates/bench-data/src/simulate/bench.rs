@@ -31,13 +31,18 @@ pub fn simulate(settings: &SimulationSettings) -> Result<Trace, SettingsError> {
         run(&profile, settings.sample_rate_hz, &mut Matched::new(settings.material))
     };
     let resistance_ohm = disturbed(settings, &profile, rest_ohm, &truth);
+    let per_unit = settings.followed.as_ref().map_or(1.0, |followed| followed.strain_per_unit(settings.full_strain()));
+    let quantity = settings.followed.as_ref().map_or(ReferenceQuantity::Strain, |followed| followed.pacing.quantity);
+    // As exact as the strain is.
+    let exact = if quantity == ReferenceQuantity::Strain { 1e5 } else { 1e3 };
     Ok(Trace {
         metadata: metadata(settings),
         time_s: truth.iter().map(|sample| round(sample.time_s, 1e6)).collect(),
         readings: readings(settings, resistance_ohm)?,
         reference: Some(Reference {
-            quantity: ReferenceQuantity::Strain,
-            values: truth.iter().map(|sample| round(sample.strain, 1e5)).collect(),
+            quantity,
+            values: truth.iter().map(|sample| round(sample.strain / per_unit, exact)).collect(),
+            sd: Vec::new(),
         }),
         temperature_c: None,
     })
@@ -132,9 +137,12 @@ fn convert(spec: &FrontEndSpec, front_end: &FrontEnd<f64>, ohm: f64, noise: f64)
 fn metadata(settings: &SimulationSettings) -> Metadata {
     let other = [
         ("source", if settings.mismatched { "simulated-mismatched" } else { "simulated" }.to_owned()),
-        ("protocol", settings.protocol.to_string()),
+        ("protocol", settings.followed.as_ref().map_or(settings.protocol.name(), |_| "a person").to_owned()),
         ("elongation_mm", settings.elongation_mm.to_string()),
-        ("speed_mm_s", settings.speed_mm_s.to_string()),
+        match &settings.followed {
+            Some(followed) => ("person", followed.person.to_string()),
+            None => ("speed_mm_s", settings.speed_mm_s.to_string()),
+        },
         ("seed", settings.seed.to_string()),
     ];
     Metadata {

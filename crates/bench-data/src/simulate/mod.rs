@@ -22,6 +22,7 @@ mod matched;
 mod material;
 mod mismatched;
 mod noise;
+mod person;
 mod profile;
 mod protocol;
 mod sensor;
@@ -30,6 +31,7 @@ mod settings;
 pub use bench::simulate;
 pub use material::{Material, UnknownMaterial};
 pub use noise::Disturbances;
+pub use person::{Followed, Person};
 pub use protocol::{Protocol, UnknownProtocol};
 pub use settings::{SettingsError, SimulationSettings};
 

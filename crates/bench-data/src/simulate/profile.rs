@@ -11,10 +11,13 @@ pub(super) struct Profile {
 }
 
 impl Profile {
-    /// Computes the strain of a protocol. `random` is used by [`Protocol::LongHolds`] and [`Protocol::Mixed`] only.
+    /// Computes the strain of a protocol. `random` is used by a person, [`Protocol::LongHolds`] and [`Protocol::Mixed`] only.
     pub(super) fn new(settings: &SimulationSettings, random: &mut ChaCha8Rng) -> Self {
         let (full, rate) = (settings.full_strain(), settings.strain_rate());
-        let mut profile = Self { time_s: vec![0.0], strain: vec![0.0] };
+        if let Some(followed) = &settings.followed {
+            return followed.profile(full, random);
+        }
+        let mut profile = Self::at(0.0);
         profile.hold(LEAD_IN_S);
         match settings.protocol {
             Protocol::ExtendRetract { cycles, rest_s } => {
@@ -54,6 +57,24 @@ impl Profile {
             }
         }
         profile
+    }
+
+    /// A body at a strain, at time zero.
+    pub(super) fn at(strain: f64) -> Self {
+        Self { time_s: vec![0.0], strain: vec![strain] }
+    }
+
+    /// Appends a straight line to a strain; a time that is past is passed over.
+    pub(super) fn line_to(&mut self, time_s: f64, strain: f64) {
+        if time_s > self.duration_s() {
+            self.time_s.push(time_s);
+            self.strain.push(strain);
+        }
+    }
+
+    /// Holds the strain until a time.
+    pub(super) fn until(&mut self, time_s: f64) {
+        self.hold(time_s - self.duration_s());
     }
 
     pub(super) fn duration_s(&self) -> f64 {
@@ -126,7 +147,7 @@ impl Profile {
 }
 
 /// Uniform in [0, 1).
-fn unit(random: &mut ChaCha8Rng) -> f64 {
+pub(super) fn unit(random: &mut ChaCha8Rng) -> f64 {
     // The bounds are constants and in order, so that there is always a distribution; its middle is a safe stand-in.
     Uniform::new(0.0, 1.0).map_or(0.5, |uniform| uniform.sample(random))
 }

@@ -1,4 +1,4 @@
-use super::{Disturbances, GAUGE_LENGTH_MM, Material, Protocol};
+use super::{Disturbances, Followed, GAUGE_LENGTH_MM, Material, Protocol};
 use crate::spec::FrontEndSpec;
 
 /// Longest simulated recording, rows: a slip of a digit must not fill the memory.
@@ -11,6 +11,8 @@ pub struct SimulationSettings {
     pub material: Material,
     /// Movements of the bench.
     pub protocol: Protocol,
+    /// A person who follows a protocol, in place of the bench's movements; default `None`.
+    pub followed: Option<Followed>,
     /// Full stretch, mm on 30 mm, above 0 and at most 15; default 10.
     pub elongation_mm: f64,
     /// Speed of the machine, mm/s, 0.01 to 100; default 1. In [`Protocol::LongHolds`] and [`Protocol::Mixed`] the
@@ -38,6 +40,7 @@ impl SimulationSettings {
         Self {
             material,
             protocol,
+            followed: None,
             elongation_mm: 10.0,
             speed_mm_s: 1.0,
             sample_rate_hz: 20.0,
@@ -51,7 +54,7 @@ impl SimulationSettings {
 
     /// The example: a sensor outside the family of laws that is fitted, stretched by up to 10 mm at up to 5 mm/s.
     #[must_use]
-    pub const fn example() -> Self {
+    pub fn example() -> Self {
         Self { speed_mm_s: 5.0, mismatched: true, ..Self::new(Material::Representative, Protocol::MIXED) }
     }
 
@@ -66,6 +69,9 @@ impl SimulationSettings {
         self.disturbances.validate()?;
         if let Some(front_end) = &self.front_end {
             front_end.build().map_err(|error| SettingsError::FrontEnd(error.to_string()))?;
+        }
+        if let Some(followed) = &self.followed {
+            followed.validate()?;
         }
         match self.protocol {
             Protocol::ExtendRetract { cycles, rest_s } => {

@@ -18,13 +18,15 @@ pub struct Mark {
     pub strain: f64,
     /// Its standard deviation; without it 2 % of the span of all marks.
     pub strain_sd: Option<f64>,
+    /// Standard deviation of its time, or of both ends of the hold, s; without it 0.2 s, a person's reaction.
+    pub time_sd_s: Option<f64>,
 }
 
 impl Mark {
     /// A strain at a moment.
     #[must_use]
     pub const fn new(time_s: f64, strain: f64) -> Self {
-        Self { time_s, until_s: None, strain, strain_sd: None }
+        Self { time_s, until_s: None, strain, strain_sd: None, time_sd_s: None }
     }
 
     /// Last time of the mark, s.
@@ -112,9 +114,10 @@ pub(crate) fn check(marks: &[Mark], time_s: &[f64]) -> Result<(f64, f64), MarksE
     let (first_s, last_s) = (time_s.first().copied().unwrap_or(f64::NAN), time_s.last().copied().unwrap_or(f64::NAN));
     let mut before_s = f64::NEG_INFINITY;
     for (k, mark) in marks.iter().enumerate() {
-        let sd = mark.strain_sd.unwrap_or(1.0);
-        let numbers = [mark.time_s, mark.end_s(), mark.strain, sd];
-        if let Some(&found) = numbers.iter().find(|x| !x.is_finite()).or((sd <= 0.0).then_some(&sd)) {
+        let sds = [mark.strain_sd.unwrap_or(1.0), mark.time_sd_s.unwrap_or(1.0)];
+        let numbers = [mark.time_s, mark.end_s(), mark.strain, sds[0], sds[1]];
+        let is_wrong = |x: &&f64| !x.is_finite();
+        if let Some(&found) = numbers.iter().find(is_wrong).or(sds.iter().find(|sd| **sd <= 0.0)) {
             return Err(MarksError::Number { mark: k, found });
         }
         if mark.end_s() < mark.time_s {

@@ -7,7 +7,7 @@ use crate::marks::holds::Stillness;
 use crate::marks::pace::{INNER_KNOTS, Pace};
 use crate::samples::Samples;
 
-/// Standard deviation of a mark's time: a person's reaction, s.
+/// Standard deviation of a mark's time where none is stated: a person's reaction, s.
 pub(crate) const TIME_SD_S: f64 = 0.2;
 /// Standard deviation of the ends of a hold that the readings show, s.
 const HOLD_SD_S: f64 = 0.6;
@@ -57,10 +57,11 @@ impl MarkedMotion {
         for (k, mark) in marks.iter().enumerate() {
             let before_s = stops.last().map(|stop| stop.depart_s).or(ends.0).unwrap_or(mark.time_s);
             let after_s = marks.get(k + 1).map(|next| next.time_s).or(ends.1).unwrap_or(mark.time_s);
-            let held = mark.until_s.map(|until_s| (mark.time_s, until_s, TIME_SD_S));
-            let found = || stillness.hold(mark.time_s, (before_s, after_s), TIME_SD_S);
+            let time_sd_s = mark.time_sd_s.unwrap_or(TIME_SD_S);
+            let held = mark.until_s.map(|until_s| (mark.time_s, until_s, time_sd_s));
+            let found = || stillness.hold(mark.time_s, (before_s, after_s), time_sd_s);
             let held = held.or_else(|| found().map(|(from_s, until_s)| (from_s, until_s, HOLD_SD_S)));
-            let (arrive_s, depart_s, time_sd_s) = held.unwrap_or((mark.time_s, mark.time_s, TIME_SD_S));
+            let (arrive_s, depart_s, time_sd_s) = held.unwrap_or((mark.time_s, mark.time_s, time_sd_s));
             stops.push(Stop {
                 arrive_s,
                 depart_s,

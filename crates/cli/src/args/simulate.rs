@@ -2,7 +2,7 @@ use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, ValueEnum};
 use ohmstrain_bench_data::FrontEndSpec;
-use ohmstrain_bench_data::simulate::{Material, Protocol};
+use ohmstrain_bench_data::simulate::{Material, Person, Protocol};
 
 use super::ReplaceArgs;
 
@@ -52,6 +52,16 @@ pub struct SimulateArgs {
     /// Movements of the bench: extend-retract, extend-hold, load-steps, long-holds or mixed
     #[arg(long, default_value = "extend-hold")]
     pub protocol: Protocol,
+    /// A person who follows this protocol, in place of the bench: late, unevenly, and off the positions
+    #[arg(long, value_name = "protocol.toml", conflicts_with_all = ["protocol", "speed_mm_s"])]
+    pub follow: Option<PathBuf>,
+    /// The person's faults: standard deviation of positions, as a share of their span, and shares of steps not made and of
+    /// holds that end early
+    #[arg(long, value_name = "SPEC", default_value = "mark_sd=0.02 missed=0 cut_short=0", requires = "follow")]
+    pub person: Person,
+    /// Joint of the protocol that the sensor sits on, if it has several
+    #[arg(long, value_name = "NAME", requires = "follow")]
+    pub joint: Option<String>,
     /// Largest elongation of the 30 mm sensor, mm
     #[arg(long, default_value_t = 10.0)]
     pub elongation_mm: f64,

@@ -18,7 +18,7 @@ use crate::args::CalibrateArgs;
 use crate::channels::Table;
 use crate::error::CliError;
 use crate::input;
-use crate::marks::{self, MarksFile};
+use crate::marks;
 use crate::messages::Messages;
 use crate::output::{Kind, Outputs, named, print};
 use crate::plausible;
@@ -86,16 +86,16 @@ pub fn calibrate(args: &CalibrateArgs, messages: &Messages) -> Result<Outcome, C
             kept.push((recordings.len() - 1, recording, rows));
         }
     }
-    let lags_s = if args.marks.is_empty() {
-        let lag = |recording: &mut TraceFile| alignment::check(recording, args.align, args.explain, messages);
-        recordings.iter_mut().map(lag).collect::<Result<Vec<_>, _>>()?
-    } else {
-        let files: Vec<MarksFile> = args.marks.iter().map(|path| MarksFile::read(path)).collect::<Result<_, _>>()?;
-        for remark in marks::take(&mut recordings, &files)? {
-            messages.remark(&remark);
+    let marked = marks::of_recordings(&recordings, &args.marks)?;
+    let mut lags_s = vec![0.0; recordings.len()];
+    for (place, recording) in recordings.iter_mut().enumerate() {
+        if marked.iter().all(|one| one.recording != place) {
+            lags_s[place] = alignment::check(recording, args.align, args.explain, messages)?;
         }
-        vec![0.0; recordings.len()]
-    };
+    }
+    for remark in marks::take(&mut recordings, &marked)? {
+        messages.remark(&remark);
+    }
     let prior = args.prior.as_deref().map(fleet::read).transpose()?;
     let wished = calibration(args);
     let wished = prior.as_ref().map_or(wished, |prior| wished.prior(prior));

@@ -17,6 +17,7 @@ mod import;
 mod inspect;
 mod live;
 mod plan;
+mod record;
 mod refine;
 mod reporting;
 mod score_table;
@@ -41,6 +42,7 @@ pub fn dispatch(command: &Command, messages: &Messages) -> Result<(), CliError> 
         Command::Import(args) => import::run(args, messages),
         Command::Simulate(args) => simulate::run(args),
         Command::Calibrate(args) => calibrate::run(args, messages),
+        Command::Record(args) => record::run(args, messages),
         Command::Refine(args) => refine::run(args, messages),
         Command::FitLaw(args) => fit_law::run(args, messages),
         Command::Filter(args) => filter::run(args, messages).map(drop),

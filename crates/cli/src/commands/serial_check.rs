@@ -6,9 +6,10 @@ use ohmstrain_sensor::SensorParams;
 
 use crate::args::SerialCheckArgs;
 use crate::commands::export_choice;
-use crate::commands::live::{Event, Source};
+
 use crate::error::CliError;
 use crate::output::print;
+use crate::port::{Event, Source};
 use crate::sensor_file;
 use crate::whole_file::is_stdin;
 use ohmstrain_export::{self as export, ChipEstimate, Plan, ReplayedRow};

@@ -1,11 +1,12 @@
 use std::path::Path;
 
 use ohmstrain_bench_data::Trace;
-use ohmstrain_bench_data::simulate::{SimulationSettings, simulate};
+use ohmstrain_bench_data::simulate::{Followed, SimulationSettings, simulate};
 
 use crate::args::{ExampleArgs, ReplaceArgs, SimulateArgs};
 use crate::error::CliError;
 use crate::output::{Kind, Outputs, SIMULATE};
+use crate::protocol_file;
 use ohmstrain::MADE_BY;
 
 /// Simulates a recording and writes it.
@@ -18,9 +19,24 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
         front_end: args.front_end,
         seed: args.seed,
         individual: args.individual,
+        followed: followed(args)?,
         ..SimulationSettings::new(args.material, args.protocol)
     };
     write(&settings, args.output.as_deref(), &args.replace)
+}
+
+/// The protocol that a person follows, if there is one.
+fn followed(args: &SimulateArgs) -> Result<Option<Followed>, CliError> {
+    let Some(path) = &args.follow else { return Ok(None) };
+    let pacing = protocol_file::read(path)?;
+    let joint = match &args.joint {
+        None => 0,
+        Some(name) => pacing.joints.iter().position(|joint| joint == name).ok_or_else(|| {
+            let joints = pacing.joints.join(", ");
+            CliError::Arguments(format!("--joint: expected a joint of {}, found `{name}` ({joints})", path.display()))
+        })?,
+    };
+    Ok(Some(Followed { pacing, joint, person: args.person }))
 }
 
 /// Writes the recording of the demo.

@@ -18,6 +18,8 @@ pub enum Kind {
     Hand,
     /// Fusion of the channels of one joint.
     Fusion,
+    /// A protocol for a person.
+    Protocol,
     /// Prior of a fleet.
     Prior,
     /// State of a running filter.
@@ -45,6 +47,7 @@ impl Kind {
             Self::Sensor => "a sensor file",
             Self::Hand => "the description of a hand",
             Self::Fusion => "a fusion",
+            Self::Protocol => "a protocol",
             Self::Prior => "a prior",
             Self::State => "the state of a filter",
             Self::Estimates => "estimates",
@@ -73,6 +76,7 @@ impl Kind {
             }
             Self::Hand => is_hand(head),
             Self::Fusion => is_format(line()) && is_made_by_toml(line()) && line().starts_with(FUSION),
+            Self::Protocol => is_format(line()) && is_made_by_toml(line()) && head.contains("\n[[positions]]\n"),
             Self::Prior => is_format(line()) && is_made_by_toml(line()) && line().starts_with("sensors = "),
             Self::State => is_format(line()) && is_made_by_toml(line()) && line().starts_with("sensor = "),
             Self::Estimates | Self::Summary => self.has_columns(&names_in(line()), own),

@@ -1,5 +1,7 @@
 //! A folder of its own for each test, the program started in it, and what it prints taken apart.
 
+pub mod terminal;
+
 use std::fs;
 use std::path::PathBuf;
 use std::process::Output;

@@ -14,6 +14,7 @@ use crate::args::CalibrateArgs;
 use crate::channels::{Channel, Table, reference};
 use crate::commands::calibrate::{calibrate_recordings, calibration, rows_in};
 use crate::error::CliError;
+use crate::marks;
 use crate::messages::Messages;
 use crate::output::{Claim, Kind, Outputs, print};
 use crate::progress::Progress;
@@ -158,21 +159,22 @@ impl Group {
         outputs: &mut Outputs,
         messages: &Messages,
     ) -> Result<(WrittenJoint, JointScores), CliError> {
-        let (mut recordings, mut calibrated) = (Vec::new(), Vec::new());
-        for channel in &self.channels {
-            let traces = self.traces(args, tables, channel)?;
+        let recordings = self.recordings(args, tables, messages)?;
+        let mut calibrated = Vec::new();
+        for (channel, traces) in self.channels.iter().zip(&recordings) {
             let progress = Progress::new("calibrating", messages);
             messages.detail(&format!("channel `{}`", channel.column));
             calibrated.push(
-                calibrate_recordings(&traces, calibration(args), &progress).map_err(|error| named(error, channel))?,
+                calibrate_recordings(traces, calibration(args), &progress).map_err(|error| named(error, channel))?,
             );
-            recordings.push(traces);
         }
         let mut entries = Vec::new();
-        for ((channel, (path, claim)), calibrated) in self.channels.iter().zip(files.sensors).zip(&calibrated) {
-            outputs.put(claim, sensor_file::text(&calibrated.sensor)?);
-            let column = channel.column.clone();
-            entries.push(Entry { column, sensor: path, rest_resistance: None, front_end: None });
+        for (k, (path, claim)) in files.sensors.into_iter().enumerate() {
+            outputs.put(claim, sensor_file::text(&calibrated[k].sensor)?);
+            let column = self.channels[k].column.clone();
+            let first = recordings[k].first().filter(|first| first.trace.readings.converter.is_some());
+            let front_end = first.and_then(|first| first.trace.metadata.front_end);
+            entries.push(Entry { column, sensor: path, rest_resistance: None, front_end });
         }
         let name = self.name.clone();
         let Some((path, claim)) = files.fusion else {
@@ -188,6 +190,35 @@ impl Group {
         Ok((WrittenJoint { name, only: None, fusion: Some(path), channels: entries }, scores))
     }
 
+    /// Recordings of each channel. Where the strain is known in holds only, channels of one joint take the reference of the channel that
+    /// tells it best.
+    fn recordings(
+        &self,
+        args: &CalibrateArgs,
+        tables: &[Table],
+        messages: &Messages,
+    ) -> Result<Vec<Vec<TraceFile>>, CliError> {
+        let mut recordings = Vec::new();
+        for channel in &self.channels {
+            let mut traces = self.traces(args, tables, channel)?;
+            let marked = marks::of_recordings(&traces, &[])?;
+            for remark in marks::take(&mut traces, &marked).map_err(|error| named(error, channel))? {
+                messages.remark(&format!("channel `{}`: {remark}", channel.column));
+            }
+            recordings.push(traces);
+        }
+        for place in 0..tables.len() {
+            let references =
+                recordings.iter().filter_map(|traces: &Vec<TraceFile>| traces[place].trace.reference.as_ref());
+            let found = references.filter_map(|reference| Some((mean_variance(&reference.sd)?, reference)));
+            let best = found.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, reference)| reference.clone());
+            for traces in recordings.iter_mut().filter(|_| best.is_some()) {
+                traces[place].trace.reference.clone_from(&best);
+            }
+        }
+        Ok(recordings)
+    }
+
     /// The recordings of a channel, as far as they are calibrated on.
     fn traces(&self, args: &CalibrateArgs, tables: &[Table], channel: &Channel) -> Result<Vec<TraceFile>, CliError> {
         let overrides = args.units.metadata();
@@ -197,6 +228,12 @@ impl Group {
         };
         tables.iter().map(rows).collect()
     }
+}
+
+/// Mean of the squares of known deviations; `None` if none is known.
+fn mean_variance(sd: &[f64]) -> Option<f64> {
+    let (count, sum) = sd.iter().filter(|sd| sd.is_finite()).fold((0.0, 0.0), |(n, sum), sd| (n + 1.0, sum + sd * sd));
+    (count > 0.0).then(|| sum / count)
 }
 
 /// An error with the channel that it is about.

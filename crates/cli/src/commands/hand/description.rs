@@ -2,7 +2,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use ohmstrain_bench_data::{FrontEndSpec, JointSpec};
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::error::CliError;
 use crate::sensor_file;
@@ -43,7 +43,7 @@ pub struct Channel {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rest_resistance: Option<f64>,
     /// Electronics, if the column has converter codes.
-    #[serde(default, deserialize_with = "spec", skip_serializing)]
+    #[serde(default, deserialize_with = "spec", serialize_with = "as_text", skip_serializing_if = "Option::is_none")]
     pub front_end: Option<FrontEndSpec>,
 }
 
@@ -91,6 +91,10 @@ impl Entry {
         }
         Ok(Joint { name, channels, fusion, joint })
     }
+}
+
+fn as_text<S: Serializer>(spec: &Option<FrontEndSpec>, out: S) -> Result<S::Ok, S::Error> {
+    out.collect_str(&spec.as_ref().map(ToString::to_string).unwrap_or_default())
 }
 
 fn spec<'de, D: Deserializer<'de>, T: FromStr<Err: std::fmt::Display>>(source: D) -> Result<Option<T>, D::Error> {

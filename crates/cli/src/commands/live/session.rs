@@ -12,6 +12,7 @@ use ohmstrain_bench_data::{Line, LineParser, Row, counted};
 use super::recorder::Recorder;
 use crate::args::{LiveArgs, RestResistance};
 use crate::error::CliError;
+use crate::port::{Due, Headed, Taker};
 use crate::run::{builder, builder_anew, median, of_first};
 use crate::suits::FIRST_LIVE_READINGS;
 
@@ -21,8 +22,6 @@ const MOST_POINTS: usize = 1 << 16;
 const GAP: f64 = 5.0;
 /// Shortest pause that is reported, s.
 const SILENCE_S: f64 = 2.0;
-/// Between lines that arrive at once, s: two digits above what is written.
-const LEAST_STEP_S: f64 = 1e-4;
 /// Share of a new step in what steps usually are.
 const NEW_STEP: f64 = 0.1;
 /// Readings of the last seconds, and how many, that tell what the rested sensor reads.
@@ -51,23 +50,6 @@ pub struct Counts {
     pub marks: u32,
 }
 
-/// Times of lines that have none: when they arrive. Of several that arrive at once each is a little later than the one
-/// before.
-#[derive(Default)]
-struct Arrivals {
-    first: Option<Instant>,
-    last_s: Option<f64>,
-}
-
-impl Arrivals {
-    fn time_s(&mut self, arrived: Instant) -> f64 {
-        let elapsed_s = arrived.duration_since(*self.first.get_or_insert(arrived)).as_secs_f64();
-        let time_s = self.last_s.map_or(elapsed_s, |last_s| elapsed_s.max(last_s + LEAST_STEP_S));
-        self.last_s = Some(time_s);
-        time_s
-    }
-}
-
 /// A filter on a stream of lines.
 pub struct Session<'a> {
     args: &'a LiveArgs,
@@ -81,8 +63,7 @@ pub struct Session<'a> {
     rest: Option<f64>,
     /// The first known readings.
     early: Vec<f64>,
-    /// Arrival times, for lines without a time.
-    arrivals: Option<Arrivals>,
+    headed: Headed,
     usual_step_s: Option<f64>,
     new_mark: Option<u32>,
     pub points: VecDeque<Point>,
@@ -111,7 +92,7 @@ impl<'a> Session<'a> {
             Some(RestResistance::Calibrated) => Some(sensor.params().rested()),
             _ => None,
         };
-        let name = args.source();
+        let name = args.port.source();
         let lines = LineParser::new(&name, args.setup.metadata(&args.estimate.units));
         let (filter, watch) = (builder(&sensor, &args.estimate).build()?, ValidityWatch::new(&sensor, rest));
         let quiet = QuietWatch::new(&sensor, rest, &args.estimate.known);
@@ -125,7 +106,7 @@ impl<'a> Session<'a> {
             quiet,
             rest,
             early: vec![],
-            arrivals: None,
+            headed: Headed::new(args.port.header.as_deref()),
             usual_step_s: None,
             new_mark: None,
             points: VecDeque::new(),
@@ -137,11 +118,8 @@ impl<'a> Session<'a> {
             message: String::new(),
         };
         session.begin()?;
-        if let Some(header) = &args.header {
-            let has_time = header.split(',').any(|name| matches!(name.trim(), "time_s" | "time_us"));
-            session.arrivals = (!has_time).then(Arrivals::default);
-            let line = if has_time { header.clone() } else { format!("time_s,{header}") };
-            match session.lines.take(line.as_bytes()) {
+        if let Some(header) = session.headed.header().map(str::to_owned) {
+            match session.lines.take(header.as_bytes()) {
                 Ok(Line::Header) => session.headed()?,
                 Ok(_) => return Err(CliError::Arguments("--header: expected names of columns".into())),
                 Err(fault) => return Err(CliError::Arguments(format!("--header: expected {}", fault.expected))),
@@ -155,33 +133,10 @@ impl<'a> Session<'a> {
         &self.sensor
     }
 
-    /// The row of a line, and whether its clock has started again; `None` if it was no row.
-    ///
-    /// # Errors
-    /// If the stream turns out not to be of this sensor.
-    pub fn parse(&mut self, line: &[u8], arrived: Instant) -> Result<Option<(Row, bool)>, CliError> {
-        let timed = |arrivals: &mut Arrivals| [format!("{:.6},", arrivals.time_s(arrived)).as_bytes(), line].concat();
-        let with_time = self.arrivals.as_mut().filter(|_| !line.trim_ascii().is_empty()).map(timed);
-        match self.lines.take(with_time.as_deref().unwrap_or(line)) {
-            Ok(Line::Row(row)) => Ok(Some((row, false))),
-            Ok(Line::Restarted(row)) => Ok(Some((row, true))),
-            Ok(Line::Header) => self.headed().map(|()| None),
-            Ok(_) => Ok(None),
-            Err(fault) => {
-                self.counts.bad_lines += 1;
-                self.message = format!("skipped {fault}");
-                if self.lines.reading_kind().is_none() {
-                    self.message += "; a stream without a header needs --header time_s,resistance_ohm";
-                }
-                Ok(None)
-            }
-        }
-    }
-
     /// A header has come: another stream begins.
     fn headed(&mut self) -> Result<(), CliError> {
         let kind = self.lines.reading_kind();
-        let header = self.args.source();
+        let header = self.args.port.source();
         kind.map_or(Ok(()), |kind| check_unit(&header, kind, self.sensor.params().reading))?;
         if let Some(joint) = trace::joint(&self.lines.metadata()) {
             self.sensor = self.calibrated.clone().on_joint(joint)?;
@@ -214,46 +169,6 @@ impl<'a> Session<'a> {
             self.toggle_record();
             self.toggle_record();
         }
-        Ok(())
-    }
-
-    /// Takes a row.
-    ///
-    /// # Errors
-    /// If no filter can be made any more.
-    pub fn take(&mut self, row: &Row, restarted: bool) -> Result<(), CliError> {
-        if restarted {
-            self.restart()?;
-        }
-        let estimate = match self.filter.step(row.time_s, trace::reading(&row.reading)) {
-            Ok(estimate) => estimate,
-            Err(error) => {
-                self.counts.bad_lines += 1;
-                self.message = error.to_string();
-                return Ok(());
-            }
-        };
-        self.count(row);
-        self.taken = Some(Instant::now());
-        let (reading, half_width) = (row.reading.value, 1.96 * estimate.strain_sd);
-        self.points.push_back(Point { time_s: row.time_s, reading, strain: estimate.strain, half_width });
-        let oldest_s = row.time_s - self.args.window_s.max(REST_S);
-        while self.points.len() > MOST_POINTS || self.points.front().is_some_and(|point| point.time_s < oldest_s) {
-            self.points.pop_front();
-        }
-        while self.marks.front().is_some_and(|mark_s| *mark_s < oldest_s) {
-            self.marks.pop_front();
-        }
-        if let Some(warning) = self.watch.see(row.time_s, reading, estimate.strain_rate, f64::NAN).last() {
-            self.message = warning.to_string();
-        }
-        if let Some(quiet) = self.quiet.see(&estimate) {
-            let quiet_s = significant(quiet.now_s - quiet.from_s, 2);
-            self.message = format!("{quiet_s} s of quiet that may be a rest: z, if it is one");
-        }
-        self.last = Some(estimate);
-        self.doubt_early(reading)?;
-        self.record(row);
         Ok(())
     }
 
@@ -293,7 +208,7 @@ impl<'a> Session<'a> {
         if self.early.len() == wanted {
             self.rest = median(self.early.clone());
             let told = self.rest.map_or(Ok(()), |measured| self.filter.rest_resistance(measured));
-            told.map_err(|refused| of_first(&refused, wanted, &self.args.source()))?;
+            told.map_err(|refused| of_first(&refused, wanted, &self.args.port.source()))?;
             self.watch = ValidityWatch::new(&self.sensor, self.rest);
         }
         if self.early.len() == wanted.max(FIRST_LIVE_READINGS)
@@ -368,5 +283,64 @@ impl<'a> Session<'a> {
             self.message = format!("cannot record: {error}");
             self.recorder = None;
         }
+    }
+}
+
+impl Taker for Session<'_> {
+    type Row = Row;
+
+    fn parse(&mut self, line: &[u8], arrived: Instant) -> Result<Option<Due<Row>>, CliError> {
+        let due = |row: Row, restarted: bool| Due { time_s: row.time_s, row, restarted };
+        match self.lines.take(&self.headed.line(line, arrived)) {
+            Ok(Line::Row(row)) => Ok(Some(due(row, false))),
+            Ok(Line::Restarted(row)) => Ok(Some(due(row, true))),
+            Ok(Line::Header) => self.headed().map(|()| None),
+            Ok(_) => Ok(None),
+            Err(fault) => {
+                self.counts.bad_lines += 1;
+                self.message = format!("skipped {fault}");
+                if self.lines.reading_kind().is_none() {
+                    self.message += "; a stream without a header needs --header time_s,resistance_ohm";
+                }
+                Ok(None)
+            }
+        }
+    }
+
+    fn take(&mut self, due: Due<Row>) -> Result<(), CliError> {
+        if due.restarted {
+            self.restart()?;
+        }
+        let row = &due.row;
+        let estimate = match self.filter.step(row.time_s, trace::reading(&row.reading)) {
+            Ok(estimate) => estimate,
+            Err(error) => {
+                self.counts.bad_lines += 1;
+                self.message = error.to_string();
+                return Ok(());
+            }
+        };
+        self.count(row);
+        self.taken = Some(Instant::now());
+        let (reading, half_width) = (row.reading.value, 1.96 * estimate.strain_sd);
+        self.points.push_back(Point { time_s: row.time_s, reading, strain: estimate.strain, half_width });
+        let oldest_s = row.time_s - self.args.window_s.max(REST_S);
+        while self.points.len() > MOST_POINTS || self.points.front().is_some_and(|point| point.time_s < oldest_s) {
+            self.points.pop_front();
+        }
+        while self.marks.front().is_some_and(|mark_s| *mark_s < oldest_s) {
+            self.marks.pop_front();
+        }
+        if let Some(warning) = self.watch.see(row.time_s, reading, estimate.strain_rate, f64::NAN).last() {
+            self.message = warning.to_string();
+        }
+        if let Some(quiet) = self.quiet.see(&estimate) {
+            let quiet_s = significant(quiet.now_s - quiet.from_s, 2);
+            self.message = format!("{quiet_s} s of quiet that may be a rest: z, if it is one");
+        }
+        self.last = Some(estimate);
+        self.doubt_early(reading)?;
+        self.record(row);
+        Ok(())
     }
 }

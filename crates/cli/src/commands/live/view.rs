@@ -34,7 +34,7 @@ pub fn draw(frame: &mut Frame, session: &Session, status: &str, args: &LiveArgs)
     let rows = [Constraint::Length(1), Constraint::Min(0), Constraint::Length(message), Constraint::Length(keys)];
     let [title, middle, message, keys] = Layout::vertical(rows).areas(frame.area());
     let sensor = args.estimate.sensor.file_name().unwrap_or_default().to_string_lossy();
-    let heading = format!("ohmstrain live · {} · {sensor} · {status}", args.source());
+    let heading = format!("ohmstrain live · {} · {sensor} · {status}", args.port.source());
     frame.render_widget(Paragraph::new(printable(&heading)).bold(), title);
     frame.render_widget(Paragraph::new(printable(&session.message)).wrap(Wrap { trim: true }), message);
     frame.render_widget(Paragraph::new("z zero at rest   r record   m mark   q quit").dim(), keys);

@@ -1,22 +1,27 @@
 //! Plan of a recording, and its worth, before anything has been recorded: simulated with a sensor's own law.
 
 mod motion;
+mod pacing;
 mod worth;
+
+use std::path::Path;
 
 use comfy_table::ColumnConstraint;
 use ohmstrain::{Calibration, EstimatorKind, JointParams, Sensor};
-use ohmstrain_bench_data::Metadata;
 use ohmstrain_bench_data::simulate::{Protocol, SimulationSettings};
+use ohmstrain_bench_data::{Metadata, ReferenceQuantity};
 use serde::Serialize;
 
 use super::calibrate::calibrate_recordings;
 use super::simulate;
 use crate::args::PlanArgs;
-use crate::error::CliError;
+use crate::error::{CliError, shell_word};
 use crate::input;
 use crate::messages::Messages;
-use crate::output::{self, print, wrapped};
+use crate::output::{self, Kind, Outputs, print, wrapped};
+use crate::printable::printable;
 use crate::progress::Progress;
+use crate::protocol_file;
 use crate::sensor_file;
 use motion::Protocols;
 use ohmstrain::number::{self, fixed, significant};
@@ -39,6 +44,9 @@ struct Json<'a> {
 
 /// Plans a recording.
 pub fn run(args: &PlanArgs, messages: &Messages) -> Result<(), CliError> {
+    if let Some(path) = &args.output {
+        return protocol(args, path);
+    }
     let (sensor, name) = match &args.sensor {
         Some(path) => (sensor_file::read(path, None)?, path.display().to_string()),
         None => (illustrative(args, messages)?, format!("an illustrative sensor ({})", args.material)),
@@ -68,6 +76,35 @@ pub fn run(args: &PlanArgs, messages: &Messages) -> Result<(), CliError> {
             return output::json(out, SCHEMA, &json);
         }
         Ok(out.write_all(text(&sensor, &name, &protocols, &told, &worth).as_bytes())?)
+    })
+}
+
+/// Writes a protocol for a person, and says what it asks for.
+fn protocol(args: &PlanArgs, path: &Path) -> Result<(), CliError> {
+    let (quantity, positions) = match (&args.strains, &args.angles) {
+        (Some(strains), _) => (ReferenceQuantity::Strain, strains),
+        (None, Some(angles)) => (ReferenceQuantity::AngleDeg, angles),
+        (None, None) => {
+            let what = "-o: expected --strains or --angles, the positions of the protocol: --strains 'rest=0 full=0.2'";
+            return Err(CliError::Arguments(what.into()));
+        }
+    };
+    let mut outputs = Outputs::new(args.replace.force, []);
+    let claim = outputs.claim(path, Kind::Protocol)?;
+    let joints = args.joints.len().max(1);
+    let values = positions.0.iter().map(|(name, value)| (name.clone(), vec![*value; joints], f64::NAN));
+    let mut pacing = protocol_file::pacing(quantity, args.joints.clone(), values.collect());
+    pacing.steps = pacing::steps(&pacing, args.minutes);
+    pacing.validate().map_err(|error| CliError::Arguments(error.to_string()))?;
+    outputs.put(claim, protocol_file::text(&pacing)?);
+    outputs.publish()?;
+    let names: Vec<&str> = pacing.positions.iter().map(|position| position.name.as_str()).collect();
+    print(|out| {
+        let (steps, minutes) = (pacing.steps.len(), significant(pacing.duration_s() / 60.0, 2));
+        let text = format!("{}: {steps} steps in {minutes} minutes, held at {}", path.display(), names.join(", "));
+        let word = shell_word(&path.display().to_string());
+        let next = format!("next: ohmstrain record --port /dev/ttyACM0 --protocol {word} -o trace.csv");
+        Ok(write!(out, "{}\n{}\n", printable(&text), printable(&next))?)
     })
 }
 

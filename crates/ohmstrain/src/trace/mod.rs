@@ -1,5 +1,7 @@
 //! Recordings as traces: the rows of a trace CSV, with the name, the header and the hash of the file that they stand in.
 
+mod marks;
+
 use std::io::Read;
 use std::ops::Range;
 use std::path::Path;
@@ -13,6 +15,7 @@ use thiserror::Error;
 
 use crate::number::significant;
 use crate::{CalibrationDoubt, Error, Interface, Reading, Recording};
+pub use marks::{Marked, take_marks};
 
 /// Rows that take no part in a calibration, named one by one.
 const NAMED_ROWS: usize = 5;
@@ -30,8 +33,6 @@ pub struct TraceFile {
     pub first_row: usize,
     /// Its contents.
     pub trace: Trace,
-    /// Standard deviations of the reference; empty if it is exact.
-    pub reference_sd: Vec<f64>,
 }
 
 /// Reason why a trace does not suit a calibration or a sensor.
@@ -94,7 +95,7 @@ impl TraceFile {
     /// The first row that cannot be read.
     pub fn collect<R: Read>(rows: TraceReader<R>, sha256: String) -> Result<Self, TraceError> {
         let (name, header) = (rows.file().to_owned(), header(rows.file(), rows.line()));
-        Ok(Self { name, header, sha256, first_row: 0, trace: Trace::collect(rows)?, reference_sd: Vec::new() })
+        Ok(Self { name, header, sha256, first_row: 0, trace: Trace::collect(rows)? })
     }
 
     /// Returns some of its rows, under the same name.
@@ -105,7 +106,6 @@ impl TraceFile {
             header: self.header.clone(),
             sha256: self.sha256.clone(),
             first_row: self.first_row + rows.start,
-            reference_sd: self.reference_sd.get(rows.clone()).unwrap_or_default().to_vec(),
             trace: self.trace.rows(rows),
         }
     }
@@ -137,9 +137,14 @@ impl TraceFile {
     /// # Errors
     /// There is no reference, or a row is not as it must be.
     pub fn move_reference(&mut self, lag_s: f64) -> Result<(), TraceFileError> {
-        let moved = aligned(&self.samples()?, lag_s);
+        let samples = self.samples()?;
+        let moved = aligned(&samples, lag_s);
+        let (time_s, reading, sd) = (samples.time_s(), samples.reading(), self.reference_sd());
+        let named = |error| TraceFileError::Samples { name: self.name.clone(), error };
+        let of_sd = (!sd.is_empty()).then(|| Samples::new(time_s, reading, sd)).transpose().map_err(named)?;
+        let sd = of_sd.map(|of_sd| aligned(&of_sd, lag_s)).unwrap_or_default();
         if let Some(reference) = &mut self.trace.reference {
-            reference.values = moved;
+            (reference.values, reference.sd) = (moved, sd);
         }
         Ok(())
     }
@@ -153,7 +158,7 @@ impl TraceFile {
             return Err(TraceFileError::NoReference { header: self.header.clone() });
         };
         let samples = Samples::new(&self.trace.time_s, &self.trace.readings.values, &reference.values);
-        let samples = match &self.reference_sd[..] {
+        let samples = match self.reference_sd() {
             [] => samples,
             sd => samples.and_then(|samples| samples.with_strain_sd(sd)),
         };
@@ -164,7 +169,7 @@ impl TraceFile {
     fn recording<'a>(&'a self, samples: &Samples<'a>) -> Result<Recording<'a>, Error> {
         let metadata = &self.trace.metadata;
         let mut one = Recording::new(samples.time_s(), samples.reading(), samples.strain())?;
-        one = if self.reference_sd.is_empty() { one } else { one.with_strain_sd(&self.reference_sd)? };
+        one = if self.reference_sd().is_empty() { one } else { one.with_strain_sd(self.reference_sd())? };
         one = one.of_file(file_name(&self.name), &self.sha256);
         one = if self.unit() == ReadingUnit::Ratio { one.of_ratios() } else { one };
         one = if self.quantity() == Some(Quantity::AngleDeg) { one.of_angles_deg() } else { one };
@@ -198,6 +203,11 @@ impl TraceFile {
     pub fn known_row(&self, row: usize) -> (f64, Reading, f64) {
         let (time_s, reading) = self.reading(row);
         (time_s, reading, self.truth(row))
+    }
+
+    /// Standard deviations of the reference; empty if it is exact.
+    fn reference_sd(&self) -> &[f64] {
+        self.trace.reference.as_ref().map_or(&[], |reference| &reference.sd)
     }
 
     /// Quantity of the reference.

@@ -1,0 +1,142 @@
+//! Recording of a person who follows a protocol: the strain is known where the body is held.
+//!
+//! The protocol runs on the clock of the readings: it waits while none come, and a recording that is played back is followed at any
+//! speed. On a terminal the steps are drawn, elsewhere they are lines.
+
+mod columns;
+mod pacer;
+mod recording;
+mod view;
+mod writer;
+
+use std::io::{self, IsTerminal, Write};
+use std::time::{Duration, Instant};
+
+use ratatui::DefaultTerminal;
+use ratatui::crossterm::event::{self, Event as Input, KeyCode, KeyEventKind, KeyModifiers};
+
+use crate::args::RecordArgs;
+use crate::error::{CliError, shell_word};
+use crate::messages::Messages;
+use crate::output::refuse_stdout;
+use crate::port::Feed;
+use crate::protocol_file;
+use columns::StreamRow;
+use pacer::Pacer;
+use recording::Recording;
+
+/// Time for which a key, or a line, is waited for.
+const KEY_WAIT: Duration = Duration::from_millis(10);
+const LINE_WAIT: Duration = Duration::from_millis(100);
+/// Time between two drawings.
+const FRAME: Duration = Duration::from_millis(50);
+
+/// Records until the protocol has been followed, the readings have ended, or the user leaves.
+pub fn run(args: &RecordArgs, messages: &Messages) -> Result<(), CliError> {
+    refuse_stdout(&args.output)?;
+    let pacing = protocol_file::read(&args.protocol)?;
+    let is_terminal = io::stdout().is_terminal();
+    if pacing.steps.is_empty() && !is_terminal {
+        let name = args.protocol.display();
+        return Err(CliError::Arguments(format!("{name} has no steps: marks by hand need a terminal")));
+    }
+    let mut feed = Feed::open(&args.port)?;
+    let mut recording = Recording::new(args, Pacer::new(pacing))?;
+    if is_terminal {
+        let failed = |error| CliError::Other(format!("cannot use the terminal: {error}"));
+        let mut terminal = ratatui::try_init().map_err(failed)?;
+        let shown = show(&mut feed, &mut terminal, &mut recording, args);
+        ratatui::restore();
+        shown?;
+    } else {
+        follow(&mut feed, &mut recording)?;
+    }
+    close(&recording, args, messages)
+}
+
+/// Ends a recording: says what it is, and what to do with it.
+fn close(recording: &Recording, args: &RecordArgs, messages: &Messages) -> Result<(), CliError> {
+    let path = args.output.display();
+    messages.remark(&recording.counts.text(recording));
+    if recording.counts.rows == 0 {
+        return Err(CliError::Input(format!("{}: no reading came; {path} is empty", args.port.source())));
+    }
+    let left = recording.pacer.left();
+    if left > 0 {
+        messages.warning(&format!("the protocol was left with {left} steps to be made"));
+    }
+    if recording.counts.holds.iter().filter(|count| **count > 0).count() < 2 {
+        messages.warning("the body was held at fewer than two positions, which no calibration takes");
+    } else {
+        let word = shell_word(&args.output.display().to_string());
+        let made = if recording.has_several_channels() { "hand.toml" } else { "sensor.toml" };
+        messages.remark(&format!("next: ohmstrain calibrate {word} -o {made}"));
+    }
+    Ok(())
+}
+
+/// Prints each step when it begins.
+fn follow(feed: &mut Feed<StreamRow>, recording: &mut Recording) -> Result<(), CliError> {
+    let mut status = String::new();
+    loop {
+        feed.take_rows(recording)?;
+        let mut out = io::stdout().lock();
+        for (time_s, text) in recording.cues.drain(..) {
+            // A recording goes on without a reader.
+            let _ = writeln!(out, "{time_s:9.1} s  {text}");
+        }
+        if status != feed.status {
+            status.clone_from(&feed.status);
+            let _ = writeln!(out, "             {status}");
+        }
+        let _ = out.flush();
+        if recording.pacer.is_done() || (feed.has_ended && feed.is_empty()) {
+            return Ok(());
+        }
+        feed.wait(LINE_WAIT, recording)?;
+    }
+}
+
+/// Draws the protocol beside the readings, and heeds keys.
+fn show(
+    feed: &mut Feed<StreamRow>,
+    terminal: &mut DefaultTerminal,
+    recording: &mut Recording,
+    args: &RecordArgs,
+) -> Result<(), CliError> {
+    let failed = |error: io::Error| CliError::Other(format!("cannot use the terminal: {error}"));
+    let mut drawn: Option<Instant> = None;
+    loop {
+        feed.take_rows(recording)?;
+        if args.bell && !recording.cues.is_empty() {
+            io::stdout().write_all(b"\x07").map_err(failed)?;
+        }
+        recording.cues.clear();
+        if recording.pacer.is_done() || (feed.has_ended && feed.is_empty()) {
+            return Ok(());
+        }
+        if drawn.is_none_or(|drawn| drawn.elapsed() >= FRAME) {
+            terminal.draw(|frame| view::draw(frame, recording, &feed.status, args)).map_err(failed)?;
+            drawn = Some(Instant::now());
+        }
+        if !event::poll(KEY_WAIT).map_err(failed)? {
+            continue;
+        }
+        let Input::Key(key) = event::read().map_err(failed)? else {
+            drawn = None;
+            continue;
+        };
+        if key.kind == KeyEventKind::Release {
+            continue;
+        }
+        match key.code {
+            KeyCode::Char('q') | KeyCode::Esc => return Ok(()),
+            KeyCode::Char('c') if key.modifiers.contains(KeyModifiers::CONTROL) => return Ok(()),
+            KeyCode::Char(digit @ '1'..='9') => recording.mark(digit as usize - '1' as usize)?,
+            _ if recording.pacer.is_marked() => recording.pacer.release(),
+            KeyCode::Char('b') => recording.repeat("spoiled")?,
+            KeyCode::Char(' ') => recording.toggle_pause()?,
+            _ => {}
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! Lines of a port as they come: a serial port, a pipe, the network, or a recording that is played back.
+
+mod arrivals;
+mod network;
+mod source;
+
+use std::path::Path;
+use std::sync::mpsc::{RecvTimeoutError, TryRecvError};
+use std::time::{Duration, Instant};
+
+use crate::args::PortArgs;
+use crate::error::CliError;
+
+pub use arrivals::Headed;
+pub use source::{Event, Source};
+
+/// Time for which rows are taken before anything else is done.
+const TAKEN_FOR: Duration = Duration::from_millis(20);
+
+/// A row with the time that it is due at.
+pub struct Due<T> {
+    pub row: T,
+    pub time_s: f64,
+    /// True if the clock has started again.
+    pub restarted: bool,
+}
+
+/// Taker of a port's lines.
+pub trait Taker {
+    /// A row of it.
+    type Row;
+
+    /// The row of a line; `None` if it was no row.
+    ///
+    /// # Errors
+    /// If the stream turns out to be of no use.
+    fn parse(&mut self, line: &[u8], arrived: Instant) -> Result<Option<Due<Self::Row>>, CliError>;
+
+    /// Takes a row that is due.
+    ///
+    /// # Errors
+    /// If nothing can go on.
+    fn take(&mut self, due: Due<Self::Row>) -> Result<(), CliError>;
+}
+
+/// Rows of a port, a recording's at the pace at which it was recorded.
+pub struct Feed<T> {
+    source: Source,
+    pace: Option<Pace>,
+    /// A row that is not due yet.
+    held: Option<Due<T>>,
+    /// State of the port in words.
+    pub status: String,
+    /// True if nothing will come any more.
+    pub has_ended: bool,
+}
+
+impl<T> Feed<T> {
+    /// Opens the port that the flags name.
+    ///
+    /// # Errors
+    /// If a recording cannot be read, or nothing can be received at an address.
+    pub fn open(args: &PortArgs) -> Result<Self, CliError> {
+        let source = match (&args.udp, &args.tcp) {
+            (Some(address), _) => Source::listening(|send| network::listen_udp(address, send))?,
+            (None, Some(address)) => Source::listening(|send| network::read_tcp(address, send))?,
+            (None, None) => Source::open(args.port.as_deref().unwrap_or(Path::new("-")), args.baud)?,
+        };
+        let pace = source.is_recording.then_some(Pace { speed: args.speed, started: None });
+        Ok(Self { source, pace, held: None, status: "waiting".into(), has_ended: false })
+    }
+
+    /// Hands on the rows that have come and are due, for a short while.
+    ///
+    /// # Errors
+    /// Those of the taker.
+    pub fn take_rows(&mut self, taker: &mut impl Taker<Row = T>) -> Result<(), CliError> {
+        let start = Instant::now();
+        while start.elapsed() < TAKEN_FOR {
+            if let Some(due) = self.held.take() {
+                if self.pace.as_mut().is_some_and(|pace| !pace.is_due(due.time_s, due.restarted)) {
+                    self.held = Some(due);
+                    return Ok(());
+                }
+                taker.take(due)?;
+            }
+            match self.source.events.try_recv() {
+                Ok(event) => self.heed(event, taker)?,
+                Err(TryRecvError::Empty | TryRecvError::Disconnected) => return Ok(()),
+            }
+        }
+        Ok(())
+    }
+
+    /// True if no row is waiting for its time.
+    pub const fn is_empty(&self) -> bool {
+        self.held.is_none()
+    }
+
+    /// Waits for a line, where nothing else is to be done, `longest` at most.
+    ///
+    /// # Errors
+    /// Those of the taker.
+    pub fn wait(&mut self, longest: Duration, taker: &mut impl Taker<Row = T>) -> Result<(), CliError> {
+        if self.held.is_some() {
+            std::thread::sleep(longest.min(TAKEN_FOR));
+            return Ok(());
+        }
+        match self.source.events.recv_timeout(longest) {
+            Ok(event) => self.heed(event, taker),
+            Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => Ok(()),
+        }
+    }
+
+    fn heed(&mut self, event: Event, taker: &mut impl Taker<Row = T>) -> Result<(), CliError> {
+        match event {
+            Event::Line(line, arrived) => self.held = taker.parse(&line, arrived)?,
+            Event::Connected => self.status = "connected".into(),
+            Event::Away(why) => self.status = format!("waiting for the port: {why}"),
+            Event::Ended => {
+                self.status = "the readings have ended".into();
+                self.has_ended = true;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Holds a recording back to the pace at which it was recorded.
+struct Pace {
+    speed: f64,
+    /// Due time of the first row, and its own time.
+    started: Option<(Instant, f64)>,
+}
+
+impl Pace {
+    fn is_due(&mut self, time_s: f64, restarted: bool) -> bool {
+        if restarted {
+            self.started = None;
+        }
+        let (start, first_s) = *self.started.get_or_insert((Instant::now(), time_s));
+        start.elapsed().as_secs_f64() * self.speed >= time_s - first_s
+    }
+}

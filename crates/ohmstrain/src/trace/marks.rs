@@ -1,0 +1,144 @@
+use ohmstrain_bench_data::pacing::{PERSON_SD_S, probable_hold};
+use ohmstrain_bench_data::{Reference, ReferenceQuantity};
+use ohmstrain_calib::{Mark, MarkedReference, MarksError};
+
+use super::TraceFile;
+use crate::number::significant;
+use crate::{Error, Recording, marked_references};
+
+/// Marks of a recording, of a file of their own or of the recording itself.
+#[derive(Clone, Debug)]
+pub struct Marked {
+    /// Place of the recording among all of them.
+    pub recording: usize,
+    /// Name of the file that the marks stand in.
+    pub name: String,
+    /// Quantity of the marks' strains.
+    pub quantity: ReferenceQuantity,
+    /// The marks, in order of time.
+    pub marks: Vec<Mark>,
+    /// Line of each mark in the file; empty if each stands for several.
+    pub lines: Vec<u64>,
+}
+
+impl Marked {
+    /// Marks that a recording itself has, see [`TraceFile::marks`].
+    #[must_use]
+    pub fn of_trace(recording: usize, file: &TraceFile) -> Option<Self> {
+        let quantity = file.trace.reference.as_ref()?.quantity;
+        Some(Self { recording, name: file.name.clone(), quantity, marks: file.marks()?, lines: Vec::new() })
+    }
+
+    /// A fault with the file and the line, or the mark, that it is about.
+    #[must_use]
+    pub fn fault(&self, fault: &MarksError) -> String {
+        let line = |mark: usize| match (self.lines.get(mark), self.marks.get(mark)) {
+            (Some(line), _) => format!(":{line}"),
+            (None, Some(found)) => format!(": hold {} (from {} s)", mark + 1, found.time_s),
+            (None, None) => String::new(),
+        };
+        format!("{}{}: {fault}", self.name, fault.mark().map_or(String::new(), line))
+    }
+
+    /// Sentence on the reference that was found.
+    #[must_use]
+    pub fn remark(&self, found: &MarkedReference) -> String {
+        let marks = self.marks.iter().map(|mark| mark.strain);
+        let (low, high) = marks.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+        let known = || found.strain_sd.iter().filter(|sd| sd.is_finite());
+        let variance = known().map(|sd| sd * sd).sum::<f64>() / known().count().max(1) as f64;
+        format!(
+            "{}: {} marks, held at {}; {} of {} moves at a pace of their own; the reference between them is good to {} % of the marks' span",
+            self.name,
+            self.marks.len(),
+            found.holds,
+            found.irregular,
+            found.moves,
+            significant(100.0 * variance.sqrt() / (high - low), 2)
+        )
+    }
+}
+
+impl TraceFile {
+    /// Marks that stand in the recording itself: its strain has a standard deviation, is known in holds, and unknown between any two of
+    /// them, as `ohmstrain record` writes it. A hold is longer than the rows in which it is certain, see [`probable_hold`]. `None` for
+    /// any other recording.
+    #[must_use]
+    pub fn marks(&self) -> Option<Vec<Mark>> {
+        let reference = self.trace.reference.as_ref().filter(|reference| !reference.sd.is_empty())?;
+        let strain = &reference.values;
+        let rows: Vec<usize> = (0..strain.len()).collect();
+        let is_alike = |a: &usize, b: &usize| strain[*a] == strain[*b] || (strain[*a].is_nan() && strain[*b].is_nan());
+        let runs: Vec<&[usize]> = rows.chunk_by(is_alike).collect();
+        let is_unknown = |run: &[usize]| strain[run[0]].is_nan();
+        if runs.len() < 2 || runs.windows(2).any(|pair| !is_unknown(pair[0]) && !is_unknown(pair[1])) {
+            return None;
+        }
+        let mark = |run: &&[usize]| {
+            let (first, last) = (run[0], run[run.len() - 1]);
+            let until_s = (last > first).then_some(self.trace.time_s[last]);
+            Mark { until_s, strain_sd: Some(reference.sd[first]), ..Mark::new(self.trace.time_s[first], strain[first]) }
+        };
+        let known = runs.iter().filter(|run| !is_unknown(run)).map(mark);
+        let mut marks: Vec<Mark> = known.collect();
+        let ends_s: Vec<(f64, f64)> =
+            marks.iter().map(|mark| (mark.time_s, mark.until_s.unwrap_or(mark.time_s))).collect();
+        for (k, mark) in marks.iter_mut().enumerate().filter(|(_, mark)| mark.until_s.is_some()) {
+            let before_s = k.checked_sub(1).map(|before| ends_s[before].1);
+            let after_s = ends_s.get(k + 1).map(|after| after.0);
+            let (from_s, until_s) = probable_hold(ends_s[k], (before_s, after_s));
+            *mark = Mark { time_s: from_s, until_s: Some(until_s), time_sd_s: Some(PERSON_SD_S), ..*mark };
+        }
+        Some(marks)
+    }
+}
+
+/// Gives recordings the references that their marks make, and returns these.
+///
+/// # Errors
+/// As [`marked_references`]; recordings in errors are places in `marked`.
+pub fn take_marks(recordings: &mut [TraceFile], marked: &[Marked]) -> Result<Vec<MarkedReference>, Error> {
+    if marked.is_empty() {
+        return Ok(Vec::new());
+    }
+    let known = marked.iter().map(|one| {
+        let trace = &recordings[one.recording].trace;
+        Recording::new(&trace.time_s, &trace.readings.values, &trace.time_s)
+    });
+    let known = known.collect::<Result<Vec<_>, _>>()?;
+    let marks: Vec<Vec<Mark>> = marked.iter().map(|one| one.marks.clone()).collect();
+    let found = marked_references(&known, &marks)?;
+    for (one, found) in marked.iter().zip(&found) {
+        let (values, sd) = (found.strain.clone(), found.strain_sd.clone());
+        recordings[one.recording].trace.reference = Some(Reference { quantity: one.quantity, values, sd });
+    }
+    Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ohmstrain_bench_data::{Metadata, TraceReader};
+
+    fn marks(rows: &str) -> Option<Vec<Mark>> {
+        let text = format!("time_s,resistance_ohm,strain,strain_sd\n{rows}");
+        let rows = TraceReader::with_overrides(text.as_bytes(), "t.csv", &Metadata::default()).unwrap();
+        TraceFile::collect(rows, String::new()).unwrap().marks()
+    }
+
+    #[test]
+    fn holds_between_unknown_rows_are_marks() {
+        let found = marks("0,9,0,0.01\n1,9,0,0.01\n2,9,,\n3,9,0.2,0.02\n4,9,,\n").unwrap();
+        let (until_s, time_sd_s) = (Some(1.7), Some(PERSON_SD_S));
+        let rest = Mark { until_s, strain_sd: Some(0.01), time_sd_s, ..Mark::new(0.0, 0.0) };
+        let moment = Mark { strain_sd: Some(0.02), ..Mark::new(3.0, 0.2) };
+        assert_eq!(found, [rest, moment]);
+    }
+
+    #[test]
+    fn strains_that_move_in_known_rows_are_no_marks() {
+        assert!(marks("0,9,0,0.01\n1,9,0.1,0.01\n2,9,,\n").is_none());
+        assert!(marks("0,9,0.1,0.01\n1,9,0.1,0.01\n").is_none());
+        assert!(marks("0,9,,\n1,9,,\n").is_none());
+    }
+}
