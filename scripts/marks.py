@@ -23,7 +23,7 @@ import numpy as np
 
 MATERIALS = ["ecoflex-00-30", "representative", "vytaflex-10"]
 SEEDS = [21, 22, 23, 24, 25, 26]
-PERSONS = ["mark_sd=0.02 missed=0 cut_short=0", "mark_sd=0.03 missed=0.03 cut_short=0.05", "mark_sd=0.05 missed=0.1 cut_short=0.1"]
+PERSONS = ["mark_sd=0.02 missed=0 cut_short=0", "mark_sd=0.03 missed=0.03 cut_short=0.05"]
 POSITIONS = "rest=0 half=0.15 full=0.3"
 RECORDINGS = ["cbs-slow-sine", "cbs-triangles", "cbs-short-ramps", "cbs-multisine", "cbs-sawtooth", "cbs-four-speeds", "nylon-sine", "nylon-triangle", "knee-bend"]
 MARKS = [10, 20, 40]

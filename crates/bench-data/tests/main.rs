@@ -10,6 +10,7 @@ mod import_bounds;
 mod import_clocks;
 #[cfg(feature = "import")]
 mod import_containers;
+mod import_each;
 #[cfg(feature = "import")]
 mod import_files;
 #[cfg(feature = "import")]

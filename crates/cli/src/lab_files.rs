@@ -51,13 +51,19 @@ pub fn read(paths: &[PathBuf], recipe: &Recipe) -> Result<Vec<Table>, CliError> 
 
 /// The command that imports files as planned, ready for a shell.
 pub fn command(paths: &[PathBuf], tables: &[Table], plan: &Plan) -> String {
+    command_of(paths, &plan.recipe(tables), &[])
+}
+
+/// The command that imports files by a recipe, with further flags.
+pub fn command_of(paths: &[PathBuf], recipe: &Recipe, flags: &[&str]) -> String {
     let mut words = vec!["ohmstrain".to_owned(), "import".to_owned()];
     for path in paths {
         let path = path.display().to_string();
         // What begins with a hyphen would be taken for a flag.
         words.push(if path.starts_with('-') && path != "-" { format!("./{path}") } else { path });
     }
-    words.extend(plan.recipe(tables).arguments());
+    words.extend(recipe.arguments());
+    words.extend(flags.iter().map(|flag| (*flag).to_owned()));
     let is_taken = |name: &str| paths.iter().any(|path| path.file_name().is_some_and(|file| file == name));
     let output = ["trace.csv", "imported.csv", "imported-trace.csv"].into_iter().find(|name| !is_taken(name));
     words.extend(["-o".to_owned(), output.unwrap_or("imported-trace-1.csv").to_owned()]);

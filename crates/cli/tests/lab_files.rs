@@ -209,6 +209,39 @@ fn recordings_of_one_file_are_written_apart() {
 }
 
 #[test]
+fn joints_of_one_file_are_imported_and_calibrated_together() {
+    let bench = Bench::new();
+    let row = |k: u32| {
+        format!(
+            "{},{},{},{},{}\n",
+            50 * k,
+            12.0 + f64::from(k % 40) / 50.0,
+            14.0 + f64::from(k % 40) / 30.0,
+            k % 40,
+            2 * (k % 40)
+        )
+    };
+    let header = "Time (ms),Thumb (kOhm),Index (kOhm),Thumb angle (deg),Index angle (deg)\n";
+    bench.write("glove.csv", header.to_owned() + &(0..400).map(row).collect::<String>());
+    let command = bench.run(&["inspect", "glove.csv", "--suggest"]).ok();
+    assert_eq!(command, "ohmstrain import glove.csv --each -o trace.csv\n");
+    let shown = bench.run(&["inspect", "glove.csv"]).ok();
+    assert!(shown.contains("thumb       `Thumb (kOhm)`, its reference `Thumb angle (deg)`\n"), "{shown}");
+    let json = bench.run(&["inspect", "glove.csv", "--json"]).ok();
+    assert!(json.contains("\"command\": \"ohmstrain import glove.csv --each -o trace.csv\""), "{json}");
+    let (code, _, said) = shell(&bench, &command);
+    assert!(code == Some(0) && said.contains("index = `Index (kOhm)`, its reference `Index angle (deg)`"), "{said}");
+    let trace = bench.read("trace.csv");
+    assert!(
+        trace.contains("\ntime_s,thumb_ohm,index_ohm,thumb_angle_deg,index_angle_deg\n0,12000,14000,0,0\n"),
+        "{trace}"
+    );
+    // What is imported again may be replaced.
+    let (code, _, said) = shell(&bench, &command);
+    assert!(code == Some(0), "{said}");
+}
+
+#[test]
 fn a_table_of_many_columns_is_cut() {
     let bench = Bench::new();
     let names: Vec<String> = (0..80).map(|pad| format!("pad_{pad}")).collect();

@@ -30,5 +30,5 @@ pub use bytes::bounds::LARGEST_FILE;
 pub use error::ImportError;
 pub use roles::{Align, Candidate, ColumnName, PerFile, Preset, Recipe, RecipeError, candidates};
 pub use table::{Column, Layout, ReadOptions, RowFilter, Table, read_table};
-pub use trace::{Allan, ChannelSurvey, ClockSurvey, Imported, PhaseSurvey, Plan, Survey};
+pub use trace::{Allan, ChannelSurvey, ClockSurvey, EachPlan, EachTrace, Imported, PhaseSurvey, Plan, Survey};
 pub use words::{DecimalMark, Role};

@@ -36,6 +36,13 @@ pub struct ImportArgs {
     /// anew, or a column `trial`, `run` or so has another value
     #[arg(long, requires = "output", conflicts_with = "recording")]
     pub split_recordings: bool,
+    /// Write every channel, with its reference, as columns of one recording: thumb_ohm, index_ohm, thumb_angle_deg, …, which
+    /// `calibrate -o hand.toml` takes. --column resistance=… for each, if not all that look like readings are meant
+    #[arg(long, conflicts_with = "split_recordings")]
+    pub each: bool,
+    /// A channel and its reference, where their names do not tell: 'R1=theta1'
+    #[arg(long = "pair", value_name = "COLUMN=COLUMN", value_parser = pair, requires = "each")]
+    pub pairs: Vec<(ColumnName, ColumnName)>,
     /// Permission to replace files
     #[command(flatten)]
     pub replace: ReplaceArgs,
@@ -126,6 +133,12 @@ impl FilesArgs {
             joint: self.setup.joint,
         }
     }
+}
+
+fn pair(text: &str) -> Result<(ColumnName, ColumnName), String> {
+    let (reading, reference) = text.split_once('=').ok_or("expected COLUMN=COLUMN, the readings before the =")?;
+    let named = |text: &str| text.parse().map_err(|error: ohmstrain_bench_data::import::RecipeError| error.to_string());
+    Ok((named(reading)?, named(reference)?))
 }
 
 fn column(text: &str) -> Result<(Role, ColumnName), String> {

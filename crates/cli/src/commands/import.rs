@@ -1,7 +1,7 @@
 use std::path::{Path, PathBuf};
 
 use ohmstrain_bench_data::counted;
-use ohmstrain_bench_data::import::{Plan, Table};
+use ohmstrain_bench_data::import::{EachPlan, Plan, Table};
 
 use crate::args::ImportArgs;
 use crate::error::CliError;
@@ -21,6 +21,10 @@ pub fn run(args: &ImportArgs, messages: &Messages) -> Result<(), CliError> {
     }
     let output = outputs.claim_or_stdout(args.output.as_deref(), Kind::Import)?;
     let tables = lab_files::read(&args.files, &recipe)?;
+    if args.each {
+        let plan = EachPlan::new(&tables, &recipe, &args.pairs)?;
+        return outputs.publish_or_print(output, each(&plan, &tables, messages)?);
+    }
     let plan = Plan::new(&tables, &recipe)?;
     messages.remark(&columns(&plan, &tables));
     let bytes = trace(&plan, &tables, messages)?;
@@ -68,6 +72,20 @@ fn trace(plan: &Plan, tables: &[Table], messages: &Messages) -> Result<Vec<u8>, 
     imported.remarks.iter().for_each(|remark| messages.remark(remark));
     let mut bytes = Vec::new();
     imported.trace.write(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// The text of a recording of all channels.
+fn each(plan: &EachPlan, tables: &[Table], messages: &Messages) -> Result<Vec<u8>, CliError> {
+    for (name, reading, reference) in plan.columns(tables) {
+        let reference = reference.map_or("no reference".into(), |reference| format!("its reference {reference}"));
+        messages.remark(&format!("{name} = {reading}, {reference}"));
+    }
+    let mut trace = plan.import(tables)?;
+    trace.metadata.other.push(("made_by".into(), format!("{MADE_BY} {IMPORT}")));
+    trace.remarks.iter().for_each(|remark| messages.remark(remark));
+    let mut bytes = Vec::new();
+    trace.write(&mut bytes)?;
     Ok(bytes)
 }
 

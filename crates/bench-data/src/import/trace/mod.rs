@@ -1,6 +1,7 @@
 //! A plan, the trace that it makes of files, and what the trace is like.
 
 mod build;
+mod each;
 mod mentions;
 mod plan;
 mod recordings;
@@ -8,5 +9,6 @@ mod survey;
 mod survey_lines;
 
 pub use build::Imported;
+pub use each::{EachPlan, EachTrace};
 pub use plan::Plan;
 pub use survey::{Allan, ChannelSurvey, ClockSurvey, PhaseSurvey, Survey};

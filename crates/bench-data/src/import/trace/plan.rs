@@ -67,6 +67,11 @@ impl Plan {
         &self.decision.readings[0].values
     }
 
+    /// The column of the reference, if there is one.
+    pub(crate) fn reference(&self) -> Option<FileColumn> {
+        self.decision.reference.as_ref().map(|reference| reference.values.place)
+    }
+
     /// Returns the recipe of flags for all of this plan.
     #[must_use]
     pub fn recipe(&self, tables: &[Table]) -> Recipe {

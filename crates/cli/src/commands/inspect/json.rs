@@ -23,6 +23,11 @@ pub fn write(out: &mut dyn Write, findings: &Findings) -> Result<(), CliError> {
         }
         Err(question) => all["question"] = json!(question.to_string()),
     }
+    if let Some(each) = &findings.each {
+        let channel = |(name, readings, reference): &(String, String, Option<String>)| json!({ "name": name, "readings": readings, "reference": reference });
+        let channels: Vec<Value> = each.channels.iter().map(channel).collect();
+        all["each"] = json!({ "command": each.command, "channels": channels });
+    }
     output::json(out, SCHEMA, &all)
 }
 

@@ -3,7 +3,7 @@ mod text;
 
 use std::path::PathBuf;
 
-use ohmstrain_bench_data::import::{ImportError, Imported, Plan, Recipe, Survey, Table};
+use ohmstrain_bench_data::import::{EachPlan, ImportError, Imported, Plan, Recipe, Role, Survey, Table};
 use ohmstrain_bench_data::{Metadata, Trace};
 
 use crate::args::InspectArgs;
@@ -18,6 +18,18 @@ pub struct Findings {
     pub tables: Vec<Table>,
     /// The import that it proposes, or what is to be answered first.
     pub plan: Result<Proposal, ImportError>,
+    /// The import of all channels in one recording, if the question is which of them is meant.
+    pub each: Option<Each>,
+}
+
+/// An import of all channels.
+pub struct Each {
+    /// Its command.
+    pub command: String,
+    /// Name, readings and reference of each channel.
+    pub channels: Vec<(String, String, Option<String>)>,
+    /// True if each channel has a reference of its own.
+    pub are_joints: bool,
 }
 
 /// An import and what it leads to.
@@ -39,7 +51,11 @@ pub fn run(args: &InspectArgs) -> Result<(), CliError> {
     let recipe = args.known.recipe();
     args.files.iter().try_for_each(|path| lab_files::refuse_results(path))?;
     let tables = lab_files::read(&args.files, &recipe)?;
+    let each = each(&args.files, &tables, &recipe);
     if args.suggest {
+        if let Some(each) = each.filter(|each| each.are_joints) {
+            return print(|out| Ok(writeln!(out, "{}", each.command)?));
+        }
         let plan = proposed(&tables, &recipe)?.0;
         let command = lab_files::command(&args.files, &tables, &plan);
         return print(|out| Ok(writeln!(out, "{command}")?));
@@ -52,8 +68,21 @@ pub fn run(args: &InspectArgs) -> Result<(), CliError> {
         }
         Err(error) => Err(error),
     };
-    let findings = Findings { tables, plan };
+    let each = each.filter(|_| plan.is_err());
+    let findings = Findings { tables, plan, each };
     print(|out| if args.json { json::write(out, &findings) } else { text::write(out, &findings) })
+}
+
+/// The import of all channels, if nobody has named one, and it works.
+fn each(files: &[PathBuf], tables: &[Table], recipe: &Recipe) -> Option<Each> {
+    let is_reading = |role: Role| matches!(role, Role::Resistance | Role::Ratio | Role::Adc);
+    if recipe.columns.iter().any(|(role, _)| is_reading(*role)) {
+        return None;
+    }
+    let plan = EachPlan::new(tables, recipe, &[]).ok()?;
+    plan.import(tables).ok()?;
+    let command = lab_files::command_of(files, recipe, &["--each"]);
+    Some(Each { command, channels: plan.columns(tables), are_joints: plan.are_joints() })
 }
 
 /// A plan that has been tried.

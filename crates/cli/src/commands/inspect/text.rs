@@ -3,7 +3,7 @@ use std::io::Write;
 use comfy_table::Table as TextTable;
 use ohmstrain_bench_data::import::{Role, candidates};
 
-use super::{Findings, Proposal};
+use super::{Each, Findings, Proposal};
 use crate::error::CliError;
 use crate::output;
 use crate::printable::printable;
@@ -21,8 +21,25 @@ pub fn write(out: &mut dyn Write, findings: &Findings) -> Result<(), CliError> {
     }
     match &findings.plan {
         Ok(proposal) => write_proposal(out, proposal),
-        Err(question) => Ok(writeln!(out, "before it can be imported: {question}")?),
+        Err(question) => match &findings.each {
+            Some(each) if each.are_joints => write_each(out, each),
+            Some(each) => {
+                let command = &each.command;
+                Ok(writeln!(out, "before it can be imported: {question}\nor all of them as one recording:\n{command}")?)
+            }
+            None => Ok(writeln!(out, "before it can be imported: {question}")?),
+        },
     }
+}
+
+/// Several joints.
+fn write_each(out: &mut dyn Write, each: &Each) -> Result<(), CliError> {
+    for (name, readings, reference) in &each.channels {
+        let reference = reference.as_deref().unwrap_or("none");
+        writeln!(out, "{:12}{}, its reference {}", printable(name), printable(readings), printable(reference))?;
+    }
+    let command = &each.command;
+    Ok(writeln!(out, "\nimport all of them with\n{command}\nor one of them with --column 'resistance=…'")?)
 }
 
 fn write_proposal(out: &mut dyn Write, proposal: &Proposal) -> Result<(), CliError> {
