@@ -289,6 +289,33 @@ mod on_a_terminal {
     }
 
     #[test]
+    fn marks_by_hand_outlast_a_step_that_is_spoiled_later() {
+        let bench = short();
+        let mut port = Port::plug_in(&bench.path("port"));
+        let mut terminal = recorded(&bench);
+        terminal.wait_for("connected");
+        port.send("time_s,resistance_ohm\n");
+        port.send(&rows(0, 90));
+        terminal.wait_for("90 rows");
+        terminal.press("2");
+        terminal.wait_for("held at B; any key ends it");
+        port.send(&rows(90, 110));
+        terminal.wait_for("110 rows");
+        terminal.press("x");
+        terminal.wait_for("paused: space goes on");
+        terminal.press(" ");
+        terminal.wait_for("to rest in 2 s");
+        port.send(&rows(110, 120));
+        terminal.wait_for("120 rows");
+        terminal.press("b");
+        terminal.wait_for("spoiled: the step is made again");
+        let left = terminal.quit();
+        assert!(left.contains("held at rest × 1, B × 2; 2 steps repeated"), "{left}");
+        let by_hand = known(&bench).iter().filter(|(_, strain)| *strain == 0.2).count();
+        assert_eq!(by_hand, 20);
+    }
+
+    #[test]
     fn any_size_of_terminal_will_do() {
         let bench = planned();
         let mut port = Port::plug_in(&bench.path("port"));

@@ -56,6 +56,11 @@ impl Pacer {
         !self.pacing.steps.is_empty() && self.ahead.is_empty() && self.current.is_none() && !self.is_paused
     }
 
+    /// True if a step is being made, which can be spoiled.
+    pub const fn is_in_step(&self) -> bool {
+        self.current.is_some() && !self.is_paused
+    }
+
     /// Number of steps that are still to be made.
     pub fn left(&self) -> usize {
         self.ahead.len() + usize::from(self.current.is_some())

@@ -138,13 +138,22 @@ impl<'a> Recording<'a> {
     /// Pauses the protocol, or goes on.
     pub fn toggle_pause(&mut self) -> Result<(), CliError> {
         let now_s = self.now_s();
-        if self.pacer.toggle_pause(now_s) { self.spoiled("paused") } else { Ok(()) }
+        if self.pacer.toggle_pause(now_s) {
+            self.spoiled("paused")?;
+        }
+        // What was marked by hand meanwhile stays.
+        self.writer.settle();
+        Ok(())
     }
 
     /// Marks a position by hand, or ends that.
     pub fn mark(&mut self, position: usize) -> Result<(), CliError> {
         let now_s = self.now_s();
-        if self.pacer.mark(position, now_s) { self.spoiled("marked by hand") } else { Ok(()) }
+        if self.pacer.mark(position, now_s) {
+            self.spoiled("marked by hand")?;
+        }
+        self.writer.settle();
+        Ok(())
     }
 
     fn spoiled(&mut self, why: &str) -> Result<(), CliError> {
@@ -256,6 +265,9 @@ impl Taker for Recording<'_> {
         self.see(held);
         let known = known_cells(self.pacer.pacing(), held);
         self.writer.row(format!("{time_s},{}", due.row.cells), &known)?;
+        if !self.pacer.is_in_step() {
+            self.writer.settle();
+        }
         self.counts.rows += 1;
         self.draw(time_s, due.row.reading);
         Ok(())
