@@ -158,7 +158,7 @@ def recording(path, folder, name, count):
         marked = [(time_s[row] + TIME_ERROR_S * random.normal(), strain[row] + STRAIN_ERROR * span * random.normal()) for row in rows]
         marked = [(min(max(t, time_s[0]), time_s[first][-1]), x) for t, x in marked]
         sd = "strain_sd" if column == "strain" else "angle_sd"
-        lines = [f"time_s,{column},{sd}"] + [f"{t:.3f},{x:.6f},{STRAIN_ERROR * span:.6f}" for t, x in sorted(marked)]
+        lines = [f"time_s,{column},{sd}"] + [f"{t:.6f},{x:.6f},{STRAIN_ERROR * span:.6f}" for t, x in sorted(marked)]
         (Path(work) / "marks.csv").write_text("\n".join(lines) + "\n")
         until_s = time_s[np.searchsorted(time_s, max(t for t, _ in marked))] + 1e-3
         program("calibrate", "trace.csv", "--until", until_s, "--marks", "marks.csv", "-o", "marks.toml")

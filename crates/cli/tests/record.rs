@@ -54,6 +54,8 @@ fn holds_of_a_person_calibrate_a_sensor() {
     let far = known.iter().filter(|row| (stated[**row] - truth[**row]).abs() > 3.0 * 0.006).count();
     assert!(far * 20 < known.len(), "{far} of {}", known.len());
 
+    let shown = bench.run(&["inspect", "trace.csv"]).ok();
+    assert!(shown.contains("needs no import; go on with\nohmstrain calibrate trace.csv -o sensor.toml"), "{shown}");
     let run = bench.run(&["calibrate", "trace.csv", "--estimator", "ekf", "-o", "sensor.toml"]);
     assert!(run.code == Some(0) && run.stderr.contains("trace.csv: 27 marks, held at 27; "), "{}", run.stderr);
     // On another day of the same person the sensor is not twice as wrong as one that was calibrated on all of the true strain, and
@@ -94,6 +96,8 @@ fn joints_of_a_glove_have_columns_of_their_own() {
     let columns =
         "time_s,thumb_adc,index_adc,temperature_c,note,thumb_angle_deg,thumb_angle_sd,index_angle_deg,index_angle_sd";
     assert_eq!(trace.header, columns);
+    let shown = bench.run(&["inspect", "trace.csv", "--front-end", front_end]).ok();
+    assert!(shown.ends_with("go on with\nohmstrain calibrate trace.csv -o hand.toml\n"), "{shown}");
     let run = bench.run(&["calibrate", "trace.csv", "--estimator", "ekf", "-o", "hand.toml"]);
     assert_eq!(run.code, Some(0), "{}", run.stderr);
     assert!(run.stderr.contains("channel `index_adc`: trace.csv: "), "{}", run.stderr);

@@ -1,10 +1,10 @@
 //! Calibration, with its progress, as `ohmstrain calibrate` does it.
 
 use js_sys::{Date, Function, JSON};
-use ohmstrain::trace::{Marked, TraceFile, check_alike, first_distrusted_rows, known_recordings, take_marks};
+use ohmstrain::trace::{TraceFile, check_alike, first_distrusted_rows, known_recordings};
 use ohmstrain::{
-    Calibration, CalibrationError, Closing, Error, EstimatorKind, GaugeFamily, Kept, LeftOutRow, Stage, Tested,
-    calibration_doubts, motion_doubts,
+    Calibration, Closing, EstimatorKind, GaugeFamily, Kept, LeftOutRow, Stage, Tested, calibration_doubts,
+    motion_doubts,
 };
 use ohmstrain_calib::{Samples, screen};
 use serde::Deserialize;
@@ -99,22 +99,15 @@ fn run(wholes: Vec<TraceFile>, choices: &Choices, progress: Option<&Function>) -
         if part.trace.is_empty() && !whole.trace.is_empty() {
             return Err(whole.no_rows(choices.from, choices.until).to_string());
         }
+        if part.marks().is_some() {
+            let what = "its strain is known in holds only; `ohmstrain calibrate` finds the motion between them, and this page does not";
+            return Err(format!("{}: {what}", part.name));
+        }
         recordings.push(part);
     }
     let mut warnings = Vec::new();
-    let own = recordings.iter().enumerate().filter_map(|(place, one)| Marked::of_trace(place, one));
-    let marked: Vec<Marked> = own.collect();
-    let mut lags_s = vec![0.0; recordings.len()];
-    for (place, recording) in recordings.iter_mut().enumerate() {
-        if marked.iter().all(|one| one.recording != place) {
-            lags_s[place] = on_one_clock(recording, choices.align, &mut warnings)?;
-        }
-    }
-    let found = take_marks(&mut recordings, &marked).map_err(|error| match error {
-        Error::Calibration(CalibrationError::Marks { recording, source }) => marked[recording].fault(&source),
-        other => other.to_string(),
-    })?;
-    warnings.extend(marked.iter().zip(&found).map(|(one, found)| one.remark(found)));
+    let lags_s = recordings.iter_mut().map(|one| on_one_clock(one, choices.align, &mut warnings));
+    let lags_s: Vec<f64> = lags_s.collect::<Result<_, _>>()?;
     let start_ms = Date::now();
     let calibrated = of_recordings(&recordings, choices.calibration()?, progress, &mut warnings)?;
     let calibration_s = (Date::now() - start_ms) / 1e3;

@@ -149,8 +149,22 @@ pub(crate) fn stem(name: &str) -> Vec<String> {
     words
 }
 
+/// Last words of a column that says how uncertain another one is.
+const UNCERTAINTIES: [&str; 10] =
+    ["sd", "std", "stdev", "stddev", "sigma", "sem", "err", "error", "unc", "uncertainty"];
+
+/// True if a name is that of another column's uncertainty: `strain_sd`.
+fn is_uncertainty(name: &str) -> bool {
+    let lower = name.to_lowercase();
+    let mut words = lower.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty());
+    words.next_back().is_some_and(|last| UNCERTAINTIES.contains(&last)) && words.next().is_some()
+}
+
 /// The role that a column's name and unit give it, if any.
 pub(crate) fn role(name: &str, unit: Option<&str>) -> Option<(Role, Sureness)> {
+    if is_uncertainty(name) {
+        return None;
+    }
     let fits = |role: Role| {
         // A unit of something else, `Position (V)`, takes the role away; no unit, or an unknown one, does not.
         unit.is_none_or(|unit| units::unit(role, unit).is_some() || !units::is_unit(unit))
@@ -204,6 +218,14 @@ fn by_unit(name: &str, unit: &str) -> Option<(Role, Sureness)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_uncertainty_has_no_role() {
+        for name in ["strain_sd", "angle_sd", "Strain error", "R std", "displacement.err"] {
+            assert_eq!(role(name, None), None, "{name}");
+        }
+        assert!(role("strain", None).is_some() && role("angle_deg", None).is_some() && role("std", None).is_none());
+    }
 
     #[test]
     fn headings_come_apart() {

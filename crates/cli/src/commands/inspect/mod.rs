@@ -7,6 +7,7 @@ use ohmstrain_bench_data::import::{EachPlan, ImportError, Imported, Plan, Recipe
 use ohmstrain_bench_data::{Metadata, Trace};
 
 use crate::args::InspectArgs;
+use crate::channels;
 use crate::error::{CliError, shell_word};
 use crate::input;
 use crate::lab_files;
@@ -30,6 +31,8 @@ pub struct Each {
     pub channels: Vec<(String, String, Option<String>)>,
     /// True if each channel has a reference of its own.
     pub are_joints: bool,
+    /// Command that goes on with a file that is such a recording already.
+    pub next: Option<String>,
 }
 
 /// An import and what it leads to.
@@ -82,7 +85,10 @@ fn each(files: &[PathBuf], tables: &[Table], recipe: &Recipe) -> Option<Each> {
     let plan = EachPlan::new(tables, recipe, &[]).ok()?;
     plan.import(tables).ok()?;
     let command = lab_files::command_of(files, recipe, &["--each"]);
-    Some(Each { command, channels: plan.columns(tables), are_joints: plan.are_joints() })
+    let is_one = |file: &&PathBuf| channels::Table::read(file).is_ok_and(|table| table.is_some());
+    let next = files.first().filter(|file| files.len() == 1 && is_one(file));
+    let next = next.map(|file| format!("ohmstrain calibrate {} -o hand.toml", shell_word(&file.display().to_string())));
+    Some(Each { command, channels: plan.columns(tables), are_joints: plan.are_joints(), next })
 }
 
 /// A plan that has been tried.

@@ -38,6 +38,12 @@ fn write_each(out: &mut dyn Write, each: &Each) -> Result<(), CliError> {
         let reference = reference.as_deref().unwrap_or("none");
         writeln!(out, "{:12}{}, its reference {}", printable(name), printable(readings), printable(reference))?;
     }
+    if let Some(next) = &each.next {
+        return Ok(writeln!(
+            out,
+            "\nit is a recording of all channels already and needs no import; go on with\n{next}"
+        )?);
+    }
     let command = &each.command;
     Ok(writeln!(out, "\nimport all of them with\n{command}\nor one of them with --column 'resistance=…'")?)
 }
