@@ -25,7 +25,8 @@ MATERIALS = ["ecoflex-00-30", "representative", "vytaflex-10"]
 SEEDS = [21, 22, 23, 24, 25, 26]
 PERSONS = ["mark_sd=0.02 missed=0 cut_short=0", "mark_sd=0.03 missed=0.03 cut_short=0.05"]
 POSITIONS = "rest=0 half=0.15 full=0.3"
-RECORDINGS = ["cbs-slow-sine", "cbs-triangles", "cbs-short-ramps", "cbs-multisine", "cbs-sawtooth", "cbs-four-speeds", "nylon-sine", "nylon-triangle", "knee-bend"]
+RECORDINGS = ["cbs-slow-sine", "cbs-triangles", "cbs-short-ramps", "cbs-multisine", "cbs-sawtooth", "knee-bend"]
+NAMES = {"cbs-slow-sine": "slow sine", "cbs-triangles": "triangles", "cbs-short-ramps": "short ramps", "cbs-multisine": "six sines", "cbs-sawtooth": "sawtooth", "knee-bend": "knee"}
 MARKS = [10, 20, 40]
 STRAIN_ERROR = 0.03
 TIME_ERROR_S = 0.2
@@ -179,13 +180,14 @@ def recordings(path, folder, names):
             try:
                 marks, scores, curve = recording(path, folder, name, count)
             except RuntimeError as error:
-                lines.append(f"| {name} | {count} | {error} |")
+                print(f"{name}, {count} marks: {error}", file=sys.stderr)
+                lines.append(f"| {NAMES.get(name, name)} | {count} | refused | | | | |")
                 continue
             if marks in tried:
                 continue
             tried.add(marks)
             cells = [f"{error:.1f} ({within:.0f})" for error, within in (*scores[0], scores[1][0])]
-            lines.append(f"| {name} | {marks} | {' | '.join(cells)} | {curve[0]:.1f} | {curve[1]:.1f} |")
+            lines.append(f"| {NAMES.get(name, name)} | {marks} | {' | '.join(cells)} | {curve[0]:.1f} | {curve[1]:.1f} |")
         return lines
 
     with ThreadPoolExecutor(2) as pool:

@@ -33,7 +33,7 @@ pub struct CalibrateArgs {
     #[arg(long, value_name = "prior.toml", conflicts_with_all = ["branches", "gauge"])]
     pub prior: Option<PathBuf>,
     /// Marks in place of a reference, a file for each recording: columns time_s, strain (or angle_deg) and, if known, until_s (the body
-    /// was held) and strain_sd. The motion between them is found with the law; a reference in the recording is not used
+    /// was held), strain_sd and time_sd_s. The motion between them is found with the law; a reference in the recording is not used
     #[arg(long, value_name = "marks.csv", conflicts_with = "align")]
     pub marks: Vec<PathBuf>,
     /// Move a reference that is early or late to where the readings say it belongs

@@ -74,7 +74,7 @@ impl EachPlan {
             }
             channels.push(PlannedChannel { name: String::new(), plan });
         }
-        name(tables, &readings, &mut channels);
+        name(tables, &mut channels);
         let first = channels[0].plan.reference();
         let is_shared = channels.iter().all(|channel| channel.plan.reference() == first);
         Ok(Self { channels, is_shared })
@@ -244,7 +244,7 @@ fn paired(error: ImportError, reading: &ColumnName) -> ImportError {
 }
 
 /// Names the channels by what is theirs in their headings, or else by the heading.
-fn name(tables: &[Table], readings: &[(Role, ColumnName)], channels: &mut [PlannedChannel]) {
+fn name(tables: &[Table], channels: &mut [PlannedChannel]) {
     let plain = |text: &str| -> String {
         let kept = text.trim().chars().map(|c| if c.is_alphanumeric() { c } else { '_' });
         kept.collect::<String>().trim_matches('_').to_lowercase()
@@ -257,7 +257,6 @@ fn name(tables: &[Table], readings: &[(Role, ColumnName)], channels: &mut [Plann
         if stem.is_empty() { format!("channel{}", place.column + 1) } else { stem }
     };
     let found: Vec<String> = channels.iter().map(named).collect();
-    debug_assert_eq!(readings.len(), channels.len());
     for (place, channel) in channels.iter_mut().enumerate() {
         let is_double = found.iter().filter(|other| **other == found[place]).count() > 1;
         channel.name = if is_double { format!("{}_{}", found[place], place + 1) } else { found[place].clone() };

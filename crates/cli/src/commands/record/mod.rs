@@ -81,13 +81,13 @@ fn follow(feed: &mut Feed<StreamRow>, recording: &mut Recording) -> Result<(), C
     loop {
         feed.take_rows(recording)?;
         let mut out = io::stdout().lock();
-        for (time_s, text) in recording.cues.drain(..) {
-            // A recording goes on without a reader.
-            let _ = writeln!(out, "{time_s:9.1} s  {text}");
-        }
         if status != feed.status {
             status.clone_from(&feed.status);
             let _ = writeln!(out, "             {status}");
+        }
+        for (time_s, text) in recording.cues.drain(..) {
+            // A recording goes on without a reader.
+            let _ = writeln!(out, "{time_s:9.1} s  {text}");
         }
         let _ = out.flush();
         if recording.pacer.is_done() || (feed.has_ended && feed.is_empty()) {
