@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What marks in place of a reference are worth, as the Markdown tables of docs/no-rig.md.
+"""Worth of marks in place of a reference, as the Markdown tables of docs/no-rig.md.
 
 scripts/marks.py PROGRAM people [SEED ...] > people.md
 scripts/marks.py PROGRAM recordings FOLDER [NAME ...] > recordings.md

@@ -104,15 +104,19 @@ pub(crate) fn choose(
         names.any(|name| find(found, taken.role, name).is_ok_and(|place| place == taken.place))
     };
     let is_wanted = |role: Role| roles.contains(&role) && answers.column(role).is_none();
-    let fitting = found.candidates.iter().filter(|one| one.is_named && is_wanted(one.role));
-    let fitting: Vec<Taken> =
-        fitting.map(|one| Taken { role: one.role, place: one.place() }).filter(|taken| !is_taken(taken)).collect();
-    match fitting[..] {
-        [] => Ok(None),
+    let fitting = |by_name: bool| -> Vec<Taken> {
+        let wanted = found.candidates.iter().filter(|one| one.is_named == by_name && is_wanted(one.role));
+        wanted.map(|one| Taken { role: one.role, place: one.place() }).filter(|taken| !is_taken(taken)).collect()
+    };
+    // A unit alone names nothing, but beside a column of the same stem: `index_deg` of `index_adc`.
+    let of_unit = || beside.and_then(|beside| paired(found, &fitting(false), beside));
+    let named = fitting(true);
+    match named[..] {
+        [] => Ok(of_unit()),
         [one] => Ok(Some(one)),
-        _ => match beside.and_then(|beside| paired(found, &fitting, beside)) {
+        _ => match beside.and_then(|beside| paired(found, &named, beside)) {
             Some(pair) => Ok(Some(pair)),
-            None => Err(several(found, what, &fitting)),
+            None => Err(several(found, what, &named)),
         },
     }
 }

@@ -16,8 +16,6 @@ use crate::trace::Trace;
 #[derive(Clone, Debug, PartialEq)]
 pub struct EachPlan {
     channels: Vec<PlannedChannel>,
-    /// True if all channels have one reference, or none has any.
-    is_shared: bool,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -54,30 +52,30 @@ impl EachPlan {
             let file = tables.first().map_or("import", |table| &table.file);
             return Err(ImportError::question(file, what, ["--column resistance=COLUMN for each of them".to_owned()]));
         }
-        let mut channels = Vec::with_capacity(readings.len());
+        let mut plans = Vec::with_capacity(readings.len());
         for (role, reading) in &readings {
             let is_reading = |(other, _): &&(Role, ColumnName)| !Role::READINGS.contains(other);
             let mut columns: Vec<(Role, ColumnName)> = given.columns.iter().filter(is_reading).cloned().collect();
             columns.push((*role, reading.clone()));
-            let paired_with = match pairs.iter().find(|(of, _)| of == reading) {
-                Some((_, reference)) => Some((reference_role(tables, reference)?, reference.clone())),
-                None => of_one_stem(tables, given, reading),
-            };
-            if let Some(reference) = paired_with {
+            if let Some((_, reference)) = pairs.iter().find(|(of, _)| of == reading) {
                 columns.retain(|(other, _)| !Role::REFERENCES.contains(other));
-                columns.push(reference);
+                columns.push((reference_role(tables, reference)?, reference.clone()));
             }
             let plan = Plan::new(tables, &Recipe { columns, ..given.clone() });
             let plan = plan.map_err(|error| paired(error, reading))?;
             if plan.reference().is_none() {
                 unreferenced(tables, given, reading)?;
             }
-            channels.push(PlannedChannel { name: String::new(), plan });
+            plans.push(plan);
         }
-        name(tables, &mut channels);
-        let first = channels[0].plan.reference();
-        let is_shared = channels.iter().all(|channel| channel.plan.reference() == first);
-        Ok(Self { channels, is_shared })
+        let named = names_of(tables, &plans).into_iter().zip(plans);
+        Ok(Self { channels: named.map(|(name, plan)| PlannedChannel { name, plan }).collect() })
+    }
+
+    /// True if all channels have one reference, or none has any.
+    fn is_shared(&self) -> bool {
+        let first = self.channels.first().and_then(|channel| channel.plan.reference());
+        self.channels.iter().all(|channel| channel.plan.reference() == first)
     }
 
     /// True if each channel has a reference that no other has: these are several joints.
@@ -131,9 +129,9 @@ impl EachPlan {
                 ReferenceQuantity::Strain => "strain",
                 ReferenceQuantity::AngleDeg => "angle_deg",
             };
-            columns.push(if self.is_shared { quantity.to_owned() } else { format!("{}_{quantity}", channel.name) });
+            columns.push(if self.is_shared() { quantity.to_owned() } else { format!("{}_{quantity}", channel.name) });
             values.push(reference.values);
-            if self.is_shared {
+            if self.is_shared() {
                 break;
             }
         }
@@ -185,17 +183,6 @@ fn readings(tables: &[Table], given: &Recipe) -> Vec<(Role, ColumnName)> {
     fitting().filter(|one| one.role == role).map(|one| (role, refer(tables, one.place()))).collect()
 }
 
-/// The only reference whose name has the same stem as a channel's, if nothing is said of references: `index_deg` of `index_adc`.
-fn of_one_stem(tables: &[Table], given: &Recipe, reading: &ColumnName) -> Option<(Role, ColumnName)> {
-    let stem = |place: FileColumn| names::stem(&tables[place.file].columns[place.column].name);
-    let found = candidates(tables);
-    let own = found.iter().map(|one| one.place()).find(|place| refer(tables, *place) == *reading).map(stem)?;
-    let is_open = |role: Role| Role::REFERENCES.contains(&role) && given.column(role).is_none();
-    let mut fitting = found.iter().filter(|one| is_open(one.role) && !own.is_empty() && stem(one.place()) == own);
-    let one = fitting.next().filter(|_| fitting.next().is_none())?;
-    Some((one.role, refer(tables, one.place())))
-}
-
 /// The role of a reference that a pair names.
 fn reference_role(tables: &[Table], name: &ColumnName) -> Result<Role, ImportError> {
     let found = candidates(tables);
@@ -243,24 +230,25 @@ fn paired(error: ImportError, reading: &ColumnName) -> ImportError {
     ImportError::Question { file, what, answers: answers.into_iter().map(pair).collect() }
 }
 
-/// Names the channels by what is theirs in their headings, or else by the heading.
-fn name(tables: &[Table], channels: &mut [PlannedChannel]) {
+/// Names of channels: what is theirs in their headings, or else the heading.
+fn names_of(tables: &[Table], plans: &[Plan]) -> Vec<String> {
     let plain = |text: &str| -> String {
         let kept = text.trim().chars().map(|c| if c.is_alphanumeric() { c } else { '_' });
         kept.collect::<String>().trim_matches('_').to_lowercase()
     };
-    let named = |channel: &PlannedChannel| {
-        let place = channel.plan.readings().place;
+    let named = |plan: &Plan| {
+        let place = plan.readings().place;
         let column = &tables[place.file].columns[place.column];
         let stem = names::stem(&column.name).join("_");
         let stem = if stem.chars().any(char::is_alphabetic) { stem } else { plain(&column.name) };
         if stem.is_empty() { format!("channel{}", place.column + 1) } else { stem }
     };
-    let found: Vec<String> = channels.iter().map(named).collect();
-    for (place, channel) in channels.iter_mut().enumerate() {
-        let is_double = found.iter().filter(|other| **other == found[place]).count() > 1;
-        channel.name = if is_double { format!("{}_{}", found[place], place + 1) } else { found[place].clone() };
-    }
+    let found: Vec<String> = plans.iter().map(named).collect();
+    let own = |(place, name): (usize, &String)| {
+        let is_double = found.iter().filter(|other| *other == name).count() > 1;
+        if is_double { format!("{name}_{}", place + 1) } else { name.clone() }
+    };
+    found.iter().enumerate().map(own).collect()
 }
 
 /// Ending of a column of readings.

@@ -54,16 +54,16 @@ pub fn run(args: &InspectArgs) -> Result<(), CliError> {
     let recipe = args.known.recipe();
     args.files.iter().try_for_each(|path| lab_files::refuse_results(path))?;
     let tables = lab_files::read(&args.files, &recipe)?;
-    let each = each(&args.files, &tables, &recipe);
+    let found = proposed(&tables, &recipe);
+    let each = if found.is_err() { each(&args.files, &tables, &recipe) } else { None };
     if args.suggest {
-        if let Some(each) = each.filter(|each| each.are_joints) {
-            return print(|out| Ok(writeln!(out, "{}", each.command)?));
-        }
-        let plan = proposed(&tables, &recipe)?.0;
-        let command = lab_files::command(&args.files, &tables, &plan);
+        let command = match (found, each.filter(|each| each.are_joints)) {
+            (Err(_), Some(each)) => each.command,
+            (found, _) => lab_files::command(&args.files, &tables, &found?.0),
+        };
         return print(|out| Ok(writeln!(out, "{command}")?));
     }
-    let plan = match proposed(&tables, &recipe) {
+    let plan = match found {
         Ok((plan, imported, survey)) => {
             let command = lab_files::command(&args.files, &tables, &plan);
             let next = next(&args.files, &imported.trace);
@@ -71,7 +71,6 @@ pub fn run(args: &InspectArgs) -> Result<(), CliError> {
         }
         Err(error) => Err(error),
     };
-    let each = each.filter(|_| plan.is_err());
     let findings = Findings { tables, plan, each };
     print(|out| if args.json { json::write(out, &findings) } else { text::write(out, &findings) })
 }
