@@ -1,5 +1,6 @@
 //! Calibration on sensors whose law is known because the test wrote it down.
 
+use std::cell::OnceCell;
 use std::f64::consts::TAU;
 
 use ohmstrain_calib::{
@@ -248,6 +249,28 @@ fn what_cannot_be_calibrated_is_refused() {
     let many = LawOptions { branches: 5, ..LawOptions::default() };
     assert!(matches!(refuse(bench.samples(), many), CalibrationError::Sensor(SensorError::Branches { found: 5 })));
     assert_eq!(fit_law(&[], LawOptions::default()).unwrap_err(), CalibrationError::NoRecording);
+}
+
+/// Three recordings in both orders: one sensor to the last bit, and every index is the caller's.
+#[test]
+fn the_order_of_the_recordings_changes_nothing() {
+    let [a, b, mut c] = [(1500.0, 0.0), (2100.0, 1.0), (1800.0, 2.0)].map(|(rest, phase)| record(rest, phase, 1e-3));
+    c.reading[300] *= 2.0;
+    let given = [a.samples().head(400), b.samples().head(500), c.samples().head(400)];
+    let first = OnceCell::new();
+    for order in [[0, 1, 2], [2, 1, 0]] {
+        let recordings = order.map(|index| given[index]);
+        let made = calibrate(&recordings, &[LawOptions::default()], &[EstimatorKind::Ekf], |_| ()).unwrap();
+        let first = first.get_or_init(|| made.clone());
+        assert_eq!(sensor(&made), sensor(first));
+        assert_eq!(made.rest_readings, order.map(|index| first.rest_readings[index]));
+        let damaged = order.iter().position(|index| *index == 2).unwrap();
+        assert!(made.distrusted.iter().any(|row| (row.recording, row.row) == (damaged, 300)), "{:?}", made.distrusted);
+        assert!(made.left_out.iter().all(|row| row.truth == recordings[row.recording].strain()[row.row]));
+        assert!(made.left_out.is_sorted_by_key(|row| row.recording));
+    }
+    let short = calibrate(&[given[1], given[0].head(20)], &[LawOptions::default()], &[EstimatorKind::Ekf], |_| ());
+    assert!(matches!(short, Err(CalibrationError::TooFewRows { recording: 1, complete: 20, .. })), "{short:?}");
 }
 
 /// Missing readings and gaps in the reference are left out, not filled with zeros.

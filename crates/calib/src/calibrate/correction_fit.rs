@@ -58,7 +58,7 @@ pub(crate) fn fit_correction(
     }
     let all = if of_make.is_some() { None } else { AllOf::several(&candidates, &of_recordings) };
     let most = if rows.is_empty() { ROWS } else { prior::ROWS };
-    rows.extend(chosen(&candidates, most).iter().map(rounded));
+    rows.extend(chosen(&candidates, &of_recordings, most).iter().map(rounded));
     let steps_s = recordings.iter().flat_map(|of| of.time_s.windows(2).map(|pair| pair[1] - pair[0]));
     let simulated = simulated_rows(fit, &MotionStats::new(recordings), &scale, median(steps_s).unwrap_or(0.0));
     Ok(learn((corrects, scale), rows, (all, reference_sd(recordings)), &simulated, limits))
@@ -216,10 +216,9 @@ fn candidate_rows(
     Ok(Some(samples.complete_rows().filter_map(row).collect()))
 }
 
-/// Rows that are spread evenly over time and the way that the features of the past go.
-fn chosen(candidates: &[TrainingRow], most: usize) -> Vec<TrainingRow> {
+/// Rows that are spread evenly over time and the path of the features of the past, in each recording by itself.
+fn chosen(candidates: &[TrainingRow], recordings: &[Range<usize>], most: usize) -> Vec<TrainingRow> {
     let n = candidates.len();
-    let most = most.min(n);
     let sd = |i: usize| {
         let mean = candidates.iter().map(|row| row.past[i]).sum::<f64>() / n as f64;
         (candidates.iter().map(|row| (row.past[i] - mean).powi(2)).sum::<f64>() / n as f64).sqrt()
@@ -229,11 +228,34 @@ fn chosen(candidates: &[TrainingRow], most: usize) -> Vec<TrainingRow> {
         let square: f64 = (0..FEATURES).map(|i| ((pair[1].past[i] - pair[0].past[i]) / sds[i]).powi(2)).sum();
         square.sqrt()
     };
-    let steps: Vec<f64> = candidates.windows(2).map(step).collect();
+    let steps: Vec<Vec<f64>> =
+        recordings.iter().map(|rows| candidates[rows.clone()].windows(2).map(step).collect()).collect();
+    let way = steps.iter().flatten().sum::<f64>().max(f64::MIN_POSITIVE);
+    let shares = recordings
+        .iter()
+        .zip(&steps)
+        .map(|(rows, steps)| BY_WAY * steps.iter().sum::<f64>() / way + (1.0 - BY_WAY) * rows.len() as f64 / n as f64);
+    let most = most.min(n);
+    let (mut chosen, mut share) = (Vec::with_capacity(most), 0.0);
+    for ((rows, steps), own) in recordings.iter().zip(&steps).zip(shares) {
+        share += own;
+        let quota = ((share * most as f64).round() as usize).saturating_sub(chosen.len());
+        chosen.extend(spread(&candidates[rows.clone()], steps, quota));
+    }
+    chosen
+}
+
+/// So many rows of a recording, the first among them, spread over time and the path whose steps are given.
+fn spread(candidates: &[TrainingRow], steps: &[f64], most: usize) -> Vec<TrainingRow> {
+    let n = candidates.len();
+    let most = most.min(n);
+    if most == 0 {
+        return vec![];
+    }
     let way = steps.iter().sum::<f64>().max(f64::MIN_POSITIVE);
     let mut gone = 0.0;
-    let mut rows: Vec<TrainingRow> = candidates.first().copied().into_iter().collect();
-    for (k, (row, step)) in candidates.iter().skip(1).zip(&steps).enumerate() {
+    let mut rows = vec![candidates[0]];
+    for (k, (row, step)) in candidates.iter().skip(1).zip(steps).enumerate() {
         gone += BY_WAY * step / way + (1.0 - BY_WAY) / (n - 1) as f64;
         // As many as should have been chosen by now, and no more than rows are left for.
         let due = gone * (most - 1) as f64 + 1.0 + 1e-9 >= (rows.len() + 1) as f64;

@@ -30,6 +30,7 @@ use crate::law::structure::LawFit;
 use crate::motion_stats::MotionStats;
 use crate::order::median;
 use crate::prior::{CorrectionPrior, Prior};
+use crate::recording::arranged::Arranged;
 use crate::recording::drift::drifts;
 use crate::recording::repeats::longest_repeat_s;
 use crate::recording::resolution::resolution;
@@ -140,8 +141,8 @@ fn handicap(kind: EstimatorKind) -> f64 {
     if kind.has_phases() { 0.0 } else { LOCK_IN }
 }
 
-/// Calibrates law, noise and motion on recordings with known strain. Deterministic: same samples, same result. Outliers, and rows
-/// far from the law, take no part ([`screen`]).
+/// Calibrates law, noise and motion on recordings with known strain. Deterministic: same samples, same result, in whatever order the
+/// recordings are given. Outliers, and rows far from the law, take no part ([`screen`]).
 ///
 /// Estimators are tried with a law for each of `structures` and each strength of ridge; the pair with the best score on
 /// blocks that the law has not seen gives the law. Every one of them, and the extended Kalman filter in any case, is then
@@ -163,6 +164,24 @@ pub fn calibrate(
 
 /// [`calibrate`] with a prior, or without.
 pub(crate) fn calibrate_once(
+    recordings: &[Samples],
+    structures: &[LawOptions],
+    kinds: &[EstimatorKind],
+    prior: Option<&Prior>,
+    progress: impl FnMut(Stage),
+) -> Result<Calibration, CalibrationError> {
+    let arranged = Arranged::new(recordings);
+    let mut made = calibrate_arranged(&arranged.recordings, structures, kinds, prior, progress)
+        .map_err(|error| arranged.callers_error(error))?;
+    made.rest_readings = arranged.in_callers_order(&made.rest_readings);
+    made.distrusted.iter_mut().for_each(|row| row.recording = arranged.caller(row.recording));
+    made.distrusted.sort_by_key(|row| (row.recording, row.row));
+    made.left_out.iter_mut().for_each(|row| row.recording = arranged.caller(row.recording));
+    made.left_out.sort_by_key(|row| row.recording);
+    Ok(made)
+}
+
+fn calibrate_arranged(
     recordings: &[Samples],
     structures: &[LawOptions],
     kinds: &[EstimatorKind],

@@ -1,5 +1,6 @@
 //! Checks of recordings before anything is fitted to them.
 
+pub(crate) mod arranged;
 pub(crate) mod drift;
 pub(crate) mod holds;
 pub(crate) mod lag;
