@@ -2,9 +2,9 @@ use crate::error::{Fault, quote};
 
 const POSITIVE: &str = "a positive resistance, or nothing for a missing reading";
 
-/// A number; NaN for an empty or `NaN` cell.
+/// Reads a number; NaN for an empty or `NaN` cell.
 ///
-/// ±∞ is bad data: no instrument measures it, and it passes through arithmetic as if it were a value.
+/// ±∞ is bad data: no instrument measures it, and in arithmetic it would pass for a value.
 pub(crate) fn number(column: &'static str, cell: &str) -> Result<f64, Fault> {
     if cell.is_empty() {
         return Ok(f64::NAN);
@@ -16,13 +16,13 @@ pub(crate) fn number(column: &'static str, cell: &str) -> Result<f64, Fault> {
     }
 }
 
-/// A positive number, or NaN for a missing one.
+/// Reads a positive number, or NaN for a missing one.
 pub(crate) fn positive(column: &'static str, cell: &str) -> Result<f64, Fault> {
     let value = number(column, cell)?;
     if value <= 0.0 { Err(Fault::in_column(column, POSITIVE, quote(cell))) } else { Ok(value) }
 }
 
-/// A whole number from 0, or `None` for an empty or `NaN` cell.
+/// Reads a whole number from 0, or `None` for an empty or `NaN` cell.
 pub(crate) fn code(column: &'static str, cell: &str) -> Result<Option<u32>, Fault> {
     if cell.is_empty() || cell.eq_ignore_ascii_case("nan") {
         return Ok(None);

@@ -10,7 +10,7 @@ pub(crate) enum Clock {
     Microseconds { last: Option<Microseconds> },
 }
 
-/// A counter's last value as it stood in the file, and unwrapped.
+/// Last value of a counter, as in the file and unwrapped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Microseconds {
     /// Counter as in the file.
@@ -19,7 +19,7 @@ pub struct Microseconds {
     pub unwrapped: u64,
 }
 
-/// The last time of a stream, from which another one of the same device may go on.
+/// Last time of a stream, from which another stream of the same device may continue.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LastTime {
     /// Time of a column in seconds.
@@ -33,7 +33,7 @@ impl Clock {
         if column == Column::TimeUs { Self::Microseconds { last: None } } else { Self::Seconds { last: None } }
     }
 
-    /// The last time, if there has been a row.
+    /// Returns the last time, if there has been a row.
     pub(crate) fn last(&self) -> Option<LastTime> {
         match self {
             Self::Seconds { last } => last.map(LastTime::Seconds),
@@ -51,7 +51,7 @@ impl Clock {
         true
     }
 
-    /// Time of a row on the file's clock, s.
+    /// Reads the time of a row on the file's clock, s.
     pub(crate) fn read(&mut self, cell: &str) -> Result<f64, Fault> {
         match self {
             Self::Seconds { last } => {
@@ -81,8 +81,8 @@ fn seconds(cell: &str, last: Option<f64>) -> Result<f64, Fault> {
     }
 }
 
-/// A 32-bit counter starts again at 0 after 71.6 minutes: a decrease that, modulo 2³², is a step forward of less than
-/// half the range counts as such, any other as time going backwards.
+/// Reads a 32-bit counter, which restarts at 0 after 71.6 minutes. A decrease that, modulo 2³², is a step forward of
+/// less than half the range counts as a restart, any other as time going backwards.
 fn microseconds(cell: &str, last: Option<Microseconds>) -> Result<Microseconds, Fault> {
     const NAME: &str = Column::TimeUs.name();
     let wrong = |_| Fault::in_column(NAME, "a time in whole microseconds", quote(cell));

@@ -2,7 +2,7 @@ use csv::StringRecord;
 
 use crate::error::{Fault, quote};
 
-/// The columns that mean something here.
+/// Columns with a meaning in a trace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Column {
     TimeS,
@@ -39,7 +39,7 @@ impl Column {
     const REFERENCES: [Self; 3] = [Self::Strain, Self::DisplacementMm, Self::AngleDeg];
     const TEMPERATURES: [Self; 1] = [Self::TemperatureC];
 
-    /// Column of the standard deviation of this one.
+    /// Returns the column of this one's standard deviation.
     pub(crate) const fn deviation(self) -> Option<Self> {
         match self {
             Self::Strain => Some(Self::StrainSd),
@@ -111,7 +111,7 @@ impl Columns {
     }
 }
 
-/// The one column of a group, or none.
+/// Returns the one column of a group, or none.
 fn one_of(header: &StringRecord, group: &[Column]) -> Result<Option<ColumnPlace>, Fault> {
     let mut seen: Option<ColumnPlace> = None;
     for (index, name) in header.iter().enumerate() {

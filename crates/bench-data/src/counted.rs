@@ -1,4 +1,4 @@
-/// A number of things, in words.
+/// Writes a number of things in words.
 ///
 /// ```
 /// use ohmstrain_bench_data::counted;

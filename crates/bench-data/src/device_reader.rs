@@ -9,13 +9,13 @@ use crate::metadata::Metadata;
 use crate::reader::{A_HEADER, called, placed};
 use crate::row::{ReadingKind, Row};
 
-/// Largest number of lines that a device may print before its header: a boot loader's are some dozen.
+/// Largest number of lines that a device may print before its header; a boot loader prints a few dozen.
 const LONGEST_PREAMBLE: usize = 100;
 
-/// Reads what a device sends, row by row: goes on after lines that are none of a trace, and where the device starts again.
-/// [`LineParser`] decides what a line is.
+/// Reads the output of a device, row by row. It continues after lines that are not part of a trace, and when the device restarts.
+/// [`LineParser`] classifies the lines.
 ///
-/// The iterator delivers the errors of lines, and the rows between them. Whatever the source itself fails with ends it.
+/// The iterator yields errors of lines, and the rows between them. An error of the source itself ends it.
 ///
 /// ```
 /// use ohmstrain_bench_data::{DeviceReader, DeviceRow, Metadata};
@@ -29,10 +29,10 @@ pub struct DeviceReader<R> {
     file: String,
     lines: Lines<R>,
     parser: LineParser,
-    /// Lines above the header that were not of a trace.
+    /// Lines above the header that are not part of a trace.
     skipped: vec::IntoIter<BadContent>,
     has_rows: bool,
-    /// A header has come behind rows.
+    /// True if a header has followed rows.
     restarted: bool,
     done: bool,
 }
@@ -47,11 +47,11 @@ pub struct DeviceRow {
 }
 
 impl<R: Read> DeviceReader<R> {
-    /// Waits for a header, for a hundred other lines at most. `name` is the source's name in messages, `overrides` replaces its
+    /// Waits for a header, through at most a hundred other lines. `name` is the source's name in messages, `overrides` replaces its
     /// metadata.
     ///
     /// # Errors
-    /// [`TraceError`] if the source fails, or no header comes.
+    /// [`TraceError`] if the source fails, or no header arrives.
     pub fn new(source: R, name: &str, overrides: &Metadata) -> Result<Self, TraceError> {
         let mut reader = Self::before_header(source, name, overrides);
         let mut skipped = Vec::new();
@@ -68,10 +68,11 @@ impl<R: Read> DeviceReader<R> {
         Ok(Self { skipped: skipped.into_iter(), ..reader })
     }
 
-    /// A source that has no header, or is joined after it: `header` names the columns, and its first line may be a row.
+    /// Reads a source without a header, or one that is joined after its header: `header` names the columns, and the first line may be a
+    /// row.
     ///
     /// # Errors
-    /// [`TraceError`] if these are no columns of a trace.
+    /// [`TraceError`] if these are not the columns of a trace.
     pub fn headless(source: R, name: &str, header: &str, overrides: &Metadata) -> Result<Self, TraceError> {
         let mut reader = Self::before_header(source, name, overrides);
         match reader.parser.take_numbered(header, 0) {
@@ -88,13 +89,13 @@ impl<R: Read> DeviceReader<R> {
         Self { file, lines, parser, skipped, has_rows: false, restarted: false, done: false }
     }
 
-    /// Name of the source, as messages call it.
+    /// Returns the name of the source in messages.
     #[must_use]
     pub fn file(&self) -> &str {
         &self.file
     }
 
-    /// Physical line read last, counted from 1; 0 before the first.
+    /// Returns the physical line read last, counted from 1; 0 before the first.
     #[must_use]
     pub fn line(&self) -> u64 {
         self.lines.number()
@@ -112,19 +113,19 @@ impl<R: Read> DeviceReader<R> {
         self.parser.metadata()
     }
 
-    /// Time of the last row, as it stood there.
+    /// Returns the time of the last row, as in the source.
     #[must_use]
     pub fn last_time(&self) -> Option<LastTime> {
         self.parser.last_time()
     }
 
-    /// Continues from the last time of a stream before this one: the first row is after it, and a counter may have wrapped. `false` if
-    /// that stream counted in another unit.
+    /// Continues from the last time of a previous stream: the first row must be later, and a counter may have wrapped. Returns `false` if
+    /// that stream used another unit of time.
     pub fn go_on(&mut self, from: LastTime) -> bool {
         self.parser.go_on(from)
     }
 
-    /// The next line; `None` at the end of the source.
+    /// Reads the next line; `None` at the end of the source.
     fn next_line(&mut self) -> Option<Result<Line, TraceError>> {
         let line = match self.lines.next() {
             Ok(line) => Ok(line?.to_owned()),

@@ -8,7 +8,7 @@ pub enum TraceError {
     /// The contents are not a trace.
     #[error(transparent)]
     Content(#[from] BadContent),
-    /// The source itself failed: the contents are not to blame.
+    /// The source itself failed; its contents are not at fault.
     #[error("{file}:{line}: cannot be read: {source}")]
     Io {
         /// Name of the source.
@@ -20,7 +20,7 @@ pub enum TraceError {
     },
 }
 
-/// Contents that are not a trace: where they stand, what was expected, what was found.
+/// Contents that are not a trace, with their place, the expected and the found content.
 ///
 /// Displayed as one line, `file:line: column `x`: expected …, found …`.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -30,15 +30,15 @@ pub struct BadContent {
     pub file: String,
     /// Physical line, counted from 1.
     pub line: u64,
-    /// The column, where there is one to blame.
+    /// The faulty column, if there is one.
     pub column: Option<String>,
     /// Expected content.
     pub expected: String,
     /// Content that was found, shortened, with control characters escaped.
     pub found: String,
-    /// True if the file has another format altogether: no header of a trace, or no UTF-8 text.
+    /// True if the file has an entirely different format: no header of a trace, or no UTF-8 text.
     pub is_foreign: bool,
-    /// True if only the time is wrong: it is not after that of the row before.
+    /// True if only the time is wrong: it is not after that of the previous row.
     pub is_late: bool,
 }
 
@@ -52,7 +52,7 @@ impl fmt::Display for BadContent {
     }
 }
 
-/// A front end or a joint that cannot be understood; its place in a file is known elsewhere.
+/// Invalid description of a front end or a joint; its place in a file is known elsewhere.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("expected {expected}, found {found}")]
 #[non_exhaustive]
@@ -90,7 +90,7 @@ impl Fault {
         Self { is_foreign: true, ..self }
     }
 
-    /// A time that is not after the one before.
+    /// Marks a time that is not after the previous one.
     pub(crate) fn late(self) -> Self {
         Self { is_late: true, ..self }
     }
@@ -120,7 +120,7 @@ impl From<SpecError> for Fault {
 
 const LONGEST_QUOTE: usize = 40;
 
-/// Foreign text as it may stand in a message: in backticks, one line, at most 40 characters.
+/// Formats foreign text for a message: in backticks, on one line, at most 40 characters.
 pub(crate) fn quote(text: &str) -> String {
     let text = text.trim();
     if text.is_empty() {

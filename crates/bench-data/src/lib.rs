@@ -2,9 +2,9 @@
 //!
 //! - [`TraceReader`] reads a recording row by row as it arrives, [`Trace`] holds a whole one and writes it back.
 //! - [`segment`] cuts a reference into stretching, holding and releasing.
-//! - With the feature `import`, the module of that name takes a lab's files apart and makes traces of them.
+//! - With the feature `import`, the module of that name makes traces from a lab's files.
 //! - [`simulate`](mod@simulate) makes recordings of a simulated bench.
-//! - [`faults`] breaks them.
+//! - [`faults`] adds faults to recordings.
 //!
 //! # Policy
 //! - Units are converted here and nowhere else: inside, there is strain, Ω or R/R₀, and seconds.
@@ -24,7 +24,7 @@
 //! ```
 //! Exactly one of `time_s`, `time_us` (whole microseconds, a 32-bit counter may wrap); exactly one of `resistance_ohm`,
 //! `resistance_ratio`, `adc` (codes, need a front end); at most one of `strain`, `displacement_mm` (needs a gauge
-//! length), `angle_deg` (strain with a joint); `temperature_c` if there is one. Other columns are passed over.
+//! length), `angle_deg` (strain with a joint); `temperature_c` is optional. Other columns are ignored.
 //!
 //! # What the simulated sensors do
 //! Without noise, drift and conditioning:

@@ -8,13 +8,13 @@ use crate::metadata::Metadata;
 use crate::row::{ReadingKind, ReferenceQuantity, Row};
 use crate::row_parser::RowParser;
 
-/// Lines in a row whose times go on from each other, but not from the last row's: then the clock has started again.
+/// Number of successive late lines, each later than the one before, after which the clock counts as restarted.
 const LATE_LINES: u32 = 3;
-/// Longest line that a device sends.
+/// Longest line of a device, bytes.
 const LONGEST_LINE: usize = 4096;
 
-/// Takes a trace apart line by line, as a device sends it: what is none of a trace is an error of that line alone, a header
-/// may come again at any time, and so may the clock start again.
+/// Parses a trace line by line, as a device sends it. A line that is not part of a trace is an error of that line alone. A header may be
+/// repeated at any time, and the clock may restart.
 ///
 /// ```
 /// use ohmstrain_bench_data::{Line, LineParser, Metadata};
@@ -27,7 +27,7 @@ const LONGEST_LINE: usize = 4096;
 pub struct LineParser {
     name: String,
     overrides: Metadata,
-    /// Metadata since the last header, if there were any.
+    /// Metadata since the last header, if any.
     before_header: Option<Metadata>,
     stream: Option<Stream>,
     number: u64,
@@ -40,7 +40,7 @@ struct Stream {
     /// Metadata with the overrides.
     metadata: Metadata,
     parser: RowParser,
-    /// The clock that late rows go on from, and how many have.
+    /// Clock of the late rows, and their number.
     late: Option<(RowParser, u32)>,
 }
 
@@ -50,30 +50,30 @@ struct Stream {
 pub enum Line {
     /// A row.
     Row(Row),
-    /// The first row of a clock that has started again.
+    /// The first row after a restart of the clock.
     Restarted(Row),
-    /// A header; what is known of the columns and the sensor may have changed.
+    /// A header; columns, and information on the sensor, may have changed.
     Header,
-    /// Nothing, metadata or a remark.
+    /// A blank line, metadata or a remark.
     Nothing,
 }
 
 impl LineParser {
-    /// Waits for a header. `name` is what errors call the source, `overrides` takes the place of the stream's metadata.
+    /// Waits for a header. `name` is the source's name in errors, `overrides` replaces the stream's metadata.
     #[must_use]
     pub fn new(name: &str, overrides: Metadata) -> Self {
         let record = StringRecord::new();
         Self { name: name.into(), overrides, before_header: None, stream: None, number: 0, record }
     }
 
-    /// Returns the stream's metadata above its last header, or above the first one that is still to come, with the overrides; units
+    /// Returns the stream's metadata above its last header, or above the first header if that is still to come, with the overrides; units
     /// are those of rows.
     #[must_use]
     pub fn metadata(&self) -> Metadata {
         self.stream.as_ref().map_or_else(|| self.above(), |stream| stream.metadata.clone()).in_own_units()
     }
 
-    /// Returns the metadata for a header that comes now: one without lines above it keeps the metadata of the one before.
+    /// Returns the metadata for a header that arrives now; one without lines above it keeps the metadata of the previous header.
     fn above(&self) -> Metadata {
         let before = self.stream.as_ref().map(|stream| &stream.metadata);
         let mut metadata = self.before_header.as_ref().or(before).cloned().unwrap_or_default();
@@ -99,27 +99,27 @@ impl LineParser {
         self.stream.as_ref().and_then(|stream| stream.parser.reference_quantity())
     }
 
-    /// Time of the last row, as it stood there.
+    /// Returns the time of the last row, as in the source.
     pub(crate) fn last_time(&self) -> Option<LastTime> {
         self.stream.as_ref().and_then(|stream| stream.parser.last_time())
     }
 
-    /// Continues from the last time of a stream before this one: the first row is after it, and a counter may have wrapped. `false` if
-    /// that stream counted in another unit.
+    /// Continues from the last time of a previous stream: the first row must be later, and a counter may have wrapped. Returns `false` if
+    /// that stream used another unit of time.
     pub(crate) fn go_on(&mut self, from: LastTime) -> bool {
         self.stream.as_mut().is_some_and(|stream| stream.parser.clock().go_on(from))
     }
 
-    /// Takes a line, with or without its end.
+    /// Parses a line, with or without its end.
     ///
     /// # Errors
-    /// If it is none of a trace; the next line is taken as if it had not been there.
+    /// If it is not part of a trace; parsing then continues as if the line were absent.
     pub fn take(&mut self, line: &[u8]) -> Result<Line, BadContent> {
         self.number += 1;
         self.of_line(line).map_err(|fault| fault.at(&self.name, self.number))
     }
 
-    /// Takes the line with this number.
+    /// Parses the line with this number.
     pub(crate) fn take_numbered(&mut self, line: &str, number: u64) -> Result<Line, Fault> {
         self.number = number;
         self.of_line(line.as_bytes())
@@ -141,7 +141,7 @@ impl LineParser {
         match (Columns::of_header(&self.record), &mut self.stream) {
             (Ok(columns), _) => self.begin(columns),
             (Err(_), Some(stream)) => stream.take(&self.record, self.number),
-            // Says which columns a header has.
+            // The fault states which columns a header has.
             (Err(fault), None) => Err(fault),
         }
     }
@@ -173,7 +173,7 @@ impl Stream {
         };
         let mut row = clock.row(record, number);
         if row.is_err() {
-            // Late by the late ones' clock, too.
+            // The row is also late by the clock of the late rows.
             (clock, count) = (RowParser::new(self.columns, &self.metadata)?, 0);
             row = clock.row(record, number);
         }
@@ -211,7 +211,7 @@ mod tests {
         let lines = ["time_s,resistance_ohm", "90,1600", "1,1600", "91,1600", "0,1", "1,1", "2,1", "3,1"];
         let known = [None, Some(90.0), None, Some(91.0), None, None, Some(2.0), Some(3.0)];
         assert_eq!(times(&lines), known);
-        // Late ones that do not go on from each other are no clock.
+        // Late rows whose times do not increase are not a restarted clock.
         let lines = ["time_s,resistance_ohm", "90,1600", "5,1600", "4,1600", "4,1600", "3,1600", "91,1600"];
         assert_eq!(times(&lines), [None, Some(90.0), None, None, None, None, Some(91.0)]);
         let lines = ["time_s,resistance_ohm", "90,1600", "time_us,resistance_ohm", "5000000,1600"];
@@ -227,7 +227,7 @@ mod tests {
         }
         assert!(parser.metadata().front_end.is_some());
         assert!(matches!(parser.take(b"5000,512"), Ok(Line::Row(row)) if row.reading.sd_ohm.is_some()));
-        // A remark is none of it, and a clock that starts again needs it.
+        // A remark is not metadata; a restarted clock still needs the metadata.
         assert!(parser.take(b"# warm now").is_ok() && parser.metadata().front_end.is_some());
         let lines = [&b"1,512"[..], b"2,512", b"3,512"].map(|line| parser.take(line));
         assert!(matches!(lines[2], Ok(Line::Restarted(row)) if row.reading.sd_ohm.is_some()), "{lines:?}");

@@ -4,7 +4,7 @@ use csv::StringRecord;
 
 use crate::error::{Fault, quote};
 
-/// Longest line that is taken for text: a bound on memory, and far above what a trace needs.
+/// Longest line of text, bytes: a bound on memory, far above what a trace needs.
 const LONGEST_LINE: u64 = 64 * 1024;
 
 /// Reason why no line could be delivered.
@@ -13,13 +13,13 @@ pub(crate) enum LineFault {
     Content(Fault),
 }
 
-/// Physical lines of text, counted, each as soon as it is complete.
+/// Physical lines of text with their numbers, each delivered as soon as it is complete.
 pub(crate) struct Lines<R> {
     source: BufReader<R>,
     buffer: Vec<u8>,
     /// Number of the line delivered last, counted from 1.
     number: u64,
-    /// The line delivered last was too long: its rest is still to come.
+    /// True if the line delivered last was too long, so that its rest is still to come.
     is_cut: bool,
 }
 
@@ -32,7 +32,7 @@ impl<R: Read> Lines<R> {
         self.number
     }
 
-    /// The next line that is not blank, without its end; `None` at the end of the source.
+    /// Returns the next line that is not blank, without its end; `None` at the end of the source.
     pub(crate) fn next(&mut self) -> Result<Option<&str>, LineFault> {
         if std::mem::take(&mut self.is_cut) {
             self.source.skip_until(b'\n').map_err(LineFault::Io)?;
@@ -56,7 +56,7 @@ impl<R: Read> Lines<R> {
     }
 }
 
-/// Refuses what is not text at all.
+/// Refuses bytes that are not text.
 fn check_bytes(bytes: &[u8], number: u64) -> Result<(), Fault> {
     const TEXT: &str = "UTF-8 text";
     if number == 1 && (bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff])) {
@@ -71,14 +71,14 @@ fn check_bytes(bytes: &[u8], number: u64) -> Result<(), Fault> {
     Ok(())
 }
 
-/// The line without byte-order mark and end of line.
+/// Returns the line without byte-order mark and line end.
 fn content(bytes: &[u8], number: u64) -> &[u8] {
     let bytes = bytes.strip_suffix(b"\n").unwrap_or(bytes);
     let bytes = bytes.strip_suffix(b"\r").unwrap_or(bytes);
     if number == 1 { bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes) } else { bytes }
 }
 
-/// Hands [`Lines`] to the csv crate, one line per call of `read`, so that a record is delivered when its line is
+/// Feeds [`Lines`] to the csv crate, one line per call of `read`, so that a record is delivered when its line is
 /// complete and [`Lines::number`] is the number of that line.
 pub(crate) struct LineFeed<R> {
     lines: Lines<R>,
@@ -89,7 +89,7 @@ pub(crate) struct LineFeed<R> {
 }
 
 impl<R: Read> LineFeed<R> {
-    /// `first` was already taken out of `lines` and is delivered again.
+    /// Starts with `first`, which was already taken from `lines` and is delivered again.
     pub(crate) fn new(lines: Lines<R>, first: &str) -> Self {
         Self { lines, pending: format!("{first}\n").into_bytes(), taken: 0, record_has_line: true, fault: None }
     }
@@ -98,14 +98,14 @@ impl<R: Read> LineFeed<R> {
         self.lines.number()
     }
 
-    /// Allows one more line to be taken. A record that needs a second one has an open quotation mark, and would
-    /// swallow the rest of the source.
+    /// Allows one more line to be taken. A record that needs a second line has an open quotation mark, and would
+    /// consume the rest of the source.
     pub(crate) const fn begin_record(&mut self) {
         self.record_has_line = false;
     }
 
-    /// Takes the next line apart at its commas, which is all that most traces need; `None` at the end of the source. A
-    /// line that needs more is left for `read`, and `false` is returned; so is every line after it.
+    /// Splits the next line at its commas, which suffices for most traces; `None` at the end of the source. A line with
+    /// quotation marks is left for `read`, and `false` is returned; all later lines are also for `read`.
     pub(crate) fn next_plain(&mut self, cells: &mut StringRecord) -> Result<Option<bool>, LineFault> {
         let Some(line) = self.lines.next()? else { return Ok(None) };
         if is_plain(line) {
@@ -135,7 +135,7 @@ impl<R: Read> LineFeed<R> {
     }
 }
 
-/// The cells of a line that stands by itself.
+/// Splits a single line into cells.
 pub(crate) fn take_apart(line: &str, cells: &mut StringRecord) -> Result<(), Fault> {
     cells.clear();
     if is_plain(line) {

@@ -7,7 +7,7 @@ use crate::spec::{FrontEndSpec, JointSpec};
 /// Metadata of a trace, one `# key = value` line each, above the header.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Metadata {
-    /// `material`: what the sensor is made of.
+    /// `material`: the material of the sensor.
     pub material: Option<String>,
     /// `gauge_length_mm`: length of the unstretched sensor, mm, positive.
     pub gauge_length_mm: Option<f64>,
@@ -26,9 +26,9 @@ pub struct Metadata {
 /// Unit of the column `strain`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StrainUnit {
-    /// A share of the length, ΔL/L₀.
+    /// Fraction of the length, ΔL/L₀.
     Fraction,
-    /// Hundredths of it.
+    /// Per cent of the length.
     Percent,
 }
 
@@ -51,7 +51,7 @@ impl StrainUnit {
         }
     }
 
-    /// Factor from a number in the file to a fraction, or to Ω.
+    /// Returns the factor from a number in the file to a fraction, or to Ω.
     #[must_use]
     pub const fn factor(self) -> f64 {
         match self {
@@ -71,7 +71,7 @@ impl ResistanceUnit {
         }
     }
 
-    /// Factor from a number in the file to a fraction, or to Ω.
+    /// Returns the factor from a number in the file to a fraction, or to Ω.
     #[must_use]
     pub const fn factor(self) -> f64 {
         match self {
@@ -99,15 +99,15 @@ impl FromStr for ResistanceUnit {
     }
 }
 
-/// Keys that mean nothing here and are kept all the same: a bound on memory, and far above what people note.
+/// Largest number of other keys, which are kept without a meaning: a bound on memory, far above normal use.
 const MOST_OTHER: usize = 1000;
 
 impl Metadata {
-    /// The keys that mean something.
+    /// Keys with a meaning in a trace.
     pub(crate) const KEYS: [&str; 6] =
         ["material", "gauge_length_mm", "front_end", "joint", "strain_unit", "resistance_unit"];
 
-    /// Returns the metadata with the units that numbers have once they have been read, if a file names a unit.
+    /// Returns the metadata with the units of numbers after reading, if a file states units.
     pub(crate) fn in_own_units(&self) -> Self {
         Self {
             strain_unit: self.strain_unit.map(|_| StrainUnit::Fraction),
@@ -116,7 +116,7 @@ impl Metadata {
         }
     }
 
-    /// Takes what `overrides` knows, keeps the rest.
+    /// Takes the values that `overrides` has, and keeps the others.
     pub fn override_with(&mut self, overrides: &Self) {
         fn take<T: Clone>(mine: &mut Option<T>, theirs: &Option<T>) {
             if theirs.is_some() {
@@ -135,7 +135,7 @@ impl Metadata {
         }
     }
 
-    /// Takes a line that starts with `#`. One without `=` is a remark and is passed over.
+    /// Parses a line that starts with `#`. One without `=` is a remark and is ignored.
     pub(crate) fn take_line(&mut self, line: &str) -> Result<(), Fault> {
         let Some((key, value)) = line.trim_start_matches('#').split_once('=') else { return Ok(()) };
         let (key, value) = (key.trim(), value.trim());
@@ -172,7 +172,7 @@ fn length_mm(text: &str) -> Result<f64, Fault> {
     }
 }
 
-/// The lines as they stand above a header, each with its end.
+/// Writes the lines as above a header, each with its end.
 impl fmt::Display for Metadata {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let known = [

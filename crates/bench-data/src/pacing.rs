@@ -1,29 +1,29 @@
-//! Protocols that pace a person: rest, to a mark in two seconds, hold for ten, back.
+//! Protocols that pace a person: rest, move to a mark in two seconds, hold for ten, move back.
 
 use thiserror::Error;
 
 use crate::row::ReferenceQuantity;
 
-/// Longest protocol, steps, and longest step, s.
+/// Largest number of steps in a protocol, and longest step, s.
 const MOST_STEPS: usize = 10_000;
 const LONGEST_S: f64 = 1e5;
-/// Time after which the body is taken to have arrived, s, and the largest share of a hold that this is.
+/// Time after which the body is assumed to have settled, s, and its largest value as a fraction of the hold.
 const SETTLING_S: f64 = 1.0;
 const SETTLING_SHARE: f64 = 1.0 / 3.0;
-/// A person who sees the seconds counted down leaves at most this early.
+/// Largest time by which a person who sees a countdown leaves early, s.
 const EARLY_S: f64 = 0.3;
 const EARLY_SHARE: f64 = 0.1;
 
-/// Time in which a person acts on a cue, s.
+/// Reaction time of a person to a cue, s.
 const REACTION_S: f64 = 0.4;
-/// Standard deviation of when a paced hold begins and ends, s: that of a person's reaction, and of moves that take longer or shorter than
-/// they should.
+/// Standard deviation of the start and the end of a paced hold, s, due to the reaction time of a person and to moves that take longer or
+/// shorter than planned.
 pub const PERSON_SD_S: f64 = 0.35;
-/// A hold ends this far into the time between it and the next one at most.
+/// Largest extension of a hold, as a fraction of the time to the neighbouring hold.
 const LONGEST_SHARE: f64 = 0.4;
 
-/// Beginning and end of a hold, s, of which a part is certain, as [`PacedStep::held_s`] has it: when the person has probably arrived,
-/// and left. `between` are the end of the certain part of the hold before it, and the beginning of that of the one after it, s.
+/// Returns the probable start and end of a hold, s, given its certain part by [`PacedStep::held_s`]: the times at which the person has
+/// probably arrived and left. `between` are the end of the previous hold's certain part and the start of the next one's, s.
 #[must_use]
 pub fn probable_hold((from_s, until_s): (f64, f64), (before_s, after_s): (Option<f64>, Option<f64>)) -> (f64, f64) {
     let earlier_s = before_s.map_or(0.0, |before_s| (SETTLING_S - REACTION_S).min(LONGEST_SHARE * (from_s - before_s)));
@@ -36,7 +36,7 @@ pub fn probable_hold((from_s, until_s): (f64, f64), (before_s, after_s): (Option
 pub struct Pacing {
     /// Quantity of the positions' values.
     pub quantity: ReferenceQuantity,
-    /// Names of the joints that have values of their own; empty if one value is of all channels.
+    /// Names of joints with their own values; empty if one value applies to all channels.
     pub joints: Vec<String>,
     /// The positions.
     pub positions: Vec<Position>,
@@ -51,28 +51,28 @@ pub struct Position {
     pub name: String,
     /// Strain or angle of each joint, or the only one.
     pub values: Vec<f64>,
-    /// Standard deviation of how well a person keeps it.
+    /// Standard deviation with which a person keeps it.
     pub sd: f64,
 }
 
 /// A move to a position and a hold there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PacedStep {
-    /// Place of the position.
+    /// Index of the position.
     pub to: usize,
-    /// Duration of the move, s; zero for a body that is there already.
+    /// Duration of the move, s; zero if the body is already there.
     pub move_s: f64,
     /// Duration of the hold, s.
     pub hold_s: f64,
 }
 
-/// Reason why a protocol is none.
+/// Reason why a protocol is invalid.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum PacingError {
-    /// Fewer than two positions, or all of one value.
+    /// Fewer than two positions, or all with the same value.
     #[error("expected at least two positions of different values, found {0}")]
     Positions(usize),
-    /// A position without as many values as there are joints.
+    /// A position whose number of values is not that of joints.
     #[error("position `{position}`: expected {expected}, found {found}")]
     Values {
         /// Name of the position.
@@ -98,14 +98,14 @@ pub enum PacingError {
 }
 
 impl PacedStep {
-    /// Duration of move and hold, s.
+    /// Returns the duration of move and hold, s.
     #[must_use]
     pub fn duration_s(&self) -> f64 {
         self.move_s + self.hold_s
     }
 
-    /// Beginning and end of the time in which the body is held for certain, s from the beginning of the step: a person is late, swings
-    /// into the mark, and may leave it early.
+    /// Returns the start and end of the time in which the body is certainly held, s from the start of the step: a person is late,
+    /// overshoots the mark, and may leave it early.
     #[must_use]
     pub fn held_s(&self) -> (f64, f64) {
         let settling_s = if self.move_s > 0.0 { SETTLING_S.min(SETTLING_SHARE * self.hold_s) } else { 0.0 };
@@ -117,7 +117,7 @@ impl Pacing {
     /// Checks positions and steps.
     ///
     /// # Errors
-    /// The first position or step that cannot be.
+    /// The first invalid position or step.
     pub fn validate(&self) -> Result<(), PacingError> {
         let first = self.positions.first();
         if self.positions.iter().all(|other| Some(&other.values) == first.map(|first| &first.values)) {
@@ -158,7 +158,7 @@ impl Pacing {
         if self.steps.len() > MOST_STEPS { Err(PacingError::Steps(self.steps.len())) } else { Ok(()) }
     }
 
-    /// Duration of all steps, s.
+    /// Returns the duration of all steps, s.
     #[must_use]
     pub fn duration_s(&self) -> f64 {
         self.steps.iter().map(PacedStep::duration_s).sum()

@@ -14,15 +14,15 @@ use crate::rows::append_number;
 
 /// First bytes of a Parquet file.
 const MAGIC: &[u8; 4] = b"PAR1";
-/// Rows that become text at once.
+/// Number of rows that are converted to text at once.
 const ROWS_AT_ONCE: usize = 256;
-/// Bytes of a text as a cell, where only numbers have a meaning: more of it would be in no message.
+/// Longest text in a cell, bytes. Only numbers have a meaning, and messages are shorter.
 const LONGEST_TEXT: usize = 1024;
 
-/// A trace in a Parquet file, as the text of the trace CSV that it stands for: line 1 is the header, data row k line k + 1.
+/// A trace in a Parquet file as the text of the equivalent trace CSV: line 1 is the header, data row k is line k + 1.
 ///
-/// The file is read page by page, whatever its size and compression (Snappy, Zstandard, LZ4, gzip, brotli). Columns that no
-/// trace has are passed over unread. Numbers arrive unchanged.
+/// The file is read page by page, whatever its size and compression (Snappy, Zstandard, LZ4, gzip, brotli). Columns without a meaning in a
+/// trace are skipped unread. Numbers are unchanged.
 ///
 /// ```no_run
 /// use ohmstrain_bench_data::{ParquetText, TraceReader};
@@ -42,7 +42,7 @@ pub struct ParquetText {
 }
 
 impl ParquetText {
-    /// True if a file that begins with these bytes is Parquet.
+    /// True if the first bytes are those of a Parquet file.
     #[must_use]
     pub fn is_one(head: &[u8]) -> bool {
         head.starts_with(MAGIC)
@@ -51,7 +51,7 @@ impl ParquetText {
     /// Reads schema and metadata of a file.
     ///
     /// # Errors
-    /// If it is no Parquet file, or its metadata on the recording make no sense.
+    /// If it is not a Parquet file, or its metadata on the recording are invalid.
     pub fn new(file: File) -> io::Result<Self> {
         let reader = SerializedFileReader::new(file).map_err(broken)?;
         let described = reader.metadata().file_metadata();
@@ -75,7 +75,7 @@ impl ParquetText {
             header.push(b',');
         }
         end_line(&mut header);
-        // The root of a schema has whatever name the program gave it that wrote the file.
+        // The name of a schema's root depends on the program that wrote the file.
         let wanted = Type::group_type_builder(&root).with_fields(wanted).build().map_err(broken)?;
         let rows = RowIter::from_file_into(Box::new(reader)).project(Some(wanted)).map_err(broken)?;
         Ok(Self { rows, metadata, is_read, pending: Cursor::new(header) })
@@ -87,7 +87,7 @@ impl ParquetText {
         &self.metadata
     }
 
-    /// The text of some more rows; empty at the end.
+    /// Returns the text of some more rows; empty at the end.
     fn more(&mut self, mut text: Vec<u8>) -> io::Result<Vec<u8>> {
         text.clear();
         for row in self.rows.by_ref().take(ROWS_AT_ONCE) {
@@ -123,14 +123,14 @@ fn push_cell(cell: &Field, out: &mut Vec<u8>) {
         Field::Null => {}
         Field::Double(value) if value.is_finite() => append_number(out, *value),
         Field::Double(value) => out.extend(value.to_string().bytes()),
-        // By its own digits: 0.1 in single precision is meant to be 0.1.
+        // Single precision is written by its own shortest decimal digits: 0.1 means 0.1.
         Field::Float(value) => out.extend(value.to_string().bytes()),
         Field::Str(text) => push_text(text, out),
         other => push_text(&other.to_string(), out),
     }
 }
 
-/// Text as a cell on one line, in quotation marks if it needs them.
+/// Appends text as a cell on one line, in quotation marks if it needs them.
 fn push_text(text: &str, out: &mut Vec<u8>) {
     let text = text.trim();
     let text = text.chars().take(LONGEST_TEXT).collect::<String>().replace(char::is_control, " ");
@@ -141,7 +141,7 @@ fn push_text(text: &str, out: &mut Vec<u8>) {
     }
 }
 
-/// The comma behind the last cell becomes the end of the line.
+/// Replaces the comma after the last cell by a line end.
 fn end_line(out: &mut [u8]) {
     if let Some(last) = out.last_mut() {
         *last = b'\n';

@@ -11,8 +11,7 @@ use csv::StringRecord;
 
 /// Reads a trace row by row, in constant memory.
 ///
-/// Metadata and header are read at construction; each row is delivered as soon as its line is complete. After an error
-/// the iterator ends.
+/// Metadata and header are read at construction; each row is delivered as soon as its line is complete. The iterator ends after an error.
 ///
 /// ```
 /// use ohmstrain_bench_data::TraceReader;
@@ -30,13 +29,13 @@ pub struct TraceReader<R> {
     parser: RowParser,
     records: csv::Reader<LineFeed<R>>,
     record: StringRecord,
-    /// True while every line was plain; after the first that was not, the csv crate reads them all.
+    /// True while every line was plain; from the first other one on, the csv crate reads all lines.
     plain: bool,
     done: bool,
 }
 
 impl<R: Read> TraceReader<R> {
-    /// Reads metadata and header. `name` is what messages call the source; `-` becomes `stdin`.
+    /// Reads metadata and header. `name` is the source's name in messages; `-` becomes `stdin`.
     ///
     /// # Errors
     /// [`TraceError`] if the source fails or does not start like a trace.
@@ -54,10 +53,10 @@ impl<R: Read> TraceReader<R> {
         Self::begin(file, lines, metadata, overrides, &header)
     }
 
-    /// A source that has no header, or is joined after it: `header` names the columns, and its first line is a row.
+    /// Reads a source without a header, or one that is joined after its header: `header` names the columns, and the first line is a row.
     ///
     /// # Errors
-    /// [`TraceError`] if these are no columns of a trace.
+    /// [`TraceError`] if these are not the columns of a trace.
     pub fn headless(source: R, name: &str, header: &str, overrides: &Metadata) -> Result<Self, TraceError> {
         Self::begin(called(name), Lines::new(source), Metadata::default(), overrides, header)
     }
@@ -82,7 +81,7 @@ impl<R: Read> TraceReader<R> {
         Ok(Self { file, metadata, parser, records, record, plain, done: false })
     }
 
-    /// Name of the source, as messages call it.
+    /// Returns the name of the source in messages.
     #[must_use]
     pub fn file(&self) -> &str {
         &self.file
@@ -118,20 +117,20 @@ impl<R: Read> TraceReader<R> {
         self.parser.has_temperature()
     }
 
-    /// Physical line read last, counted from 1; 0 before the first, where the header stands elsewhere.
+    /// Returns the physical line read last, counted from 1; 0 before the first, if the header is not in the source.
     #[must_use]
     pub fn line(&self) -> u64 {
         self.records.get_ref().line()
     }
 
-    /// Time of the last row, as it stood there.
+    /// Returns the time of the last row, as in the source.
     #[must_use]
     pub fn last_time(&self) -> Option<LastTime> {
         self.parser.last_time()
     }
 
-    /// Continues from the last time of a stream before this one: the first row is after it, and a counter may have wrapped. `false` if
-    /// that stream counted in another unit.
+    /// Continues from the last time of a previous stream: the first row must be later, and a counter may have wrapped. Returns `false` if
+    /// that stream used another unit of time.
     pub fn go_on(&mut self, from: LastTime) -> bool {
         self.parser.clock().go_on(from)
     }
@@ -181,12 +180,12 @@ pub(crate) fn called(name: &str) -> String {
     if name == "-" { "stdin" } else { name }.to_owned()
 }
 
-/// Lines of remarks and metadata above a header, after which there is none.
+/// Largest number of lines of remarks and metadata above a header.
 const MOST_REMARKS: usize = 10_000;
 
 pub(crate) const A_HEADER: &str = "a header such as `time_s,resistance_ohm,strain`";
 
-/// Metadata lines, and the header line.
+/// Reads the metadata lines and the header line.
 fn read_prelude<R: Read>(lines: &mut Lines<R>) -> Result<(Metadata, String), LineFault> {
     let mut metadata = Metadata::default();
     for _ in 0..MOST_REMARKS {
@@ -202,18 +201,18 @@ fn read_prelude<R: Read>(lines: &mut Lines<R>) -> Result<(Metadata, String), Lin
     Err(LineFault::Content(Fault::new(A_HEADER, format!("none below {MOST_REMARKS} lines that begin with `#`"))))
 }
 
-/// An error of the csv crate is one of the lines that it was fed with.
+/// Returns the error of the line that made the csv crate fail.
 fn feed_error<R: Read>(error: csv::Error, records: &mut csv::Reader<LineFeed<R>>, file: &str) -> TraceError {
     let fault = records.get_mut().take_fault().unwrap_or_else(|| LineFault::Io(error.into()));
     placed(fault, file, records.get_ref().line())
 }
 
-/// `line` was delivered last.
+/// Adds the place to a fault; `line` was delivered last.
 pub(crate) fn placed(fault: LineFault, file: &str, line: u64) -> TraceError {
     match fault {
-        // An empty file has no line at all; what is missing, is missing on its first.
+        // An empty file has no line at all; anything missing is reported on the first line.
         LineFault::Content(fault) => fault.at(file, line.max(1)).into(),
-        // The failure stands behind the last line that was delivered.
+        // The failure is after the last line that was delivered.
         LineFault::Io(source) => TraceError::Io { file: file.to_owned(), line: line + 1, source },
     }
 }

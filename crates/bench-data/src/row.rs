@@ -3,7 +3,7 @@
 pub enum ReadingKind {
     /// Resistance, Ω.
     Ohm,
-    /// Resistance over resistance at rest, R/R₀.
+    /// Resistance over the resistance at rest, R/R₀.
     Ratio,
 }
 
@@ -21,11 +21,11 @@ pub enum ReferenceQuantity {
 pub struct Reading {
     /// Ω or R/R₀, see [`reading_kind`](crate::TraceReader::reading_kind); NaN if missing or saturated.
     pub value: f64,
-    /// Standard deviation that the front end gives the reading, Ω; known for converter codes only.
+    /// Standard deviation of the reading by the front end, Ω; known for converter codes only.
     pub sd_ohm: Option<f64>,
     /// The converter's code, if the file has codes and this one is not missing.
     pub code: Option<u32>,
-    /// The converter stood at an end of its scale.
+    /// True if the converter was at an end of its scale.
     pub saturated: bool,
 }
 

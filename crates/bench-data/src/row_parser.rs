@@ -8,7 +8,7 @@ use crate::error::{Fault, quote};
 use crate::metadata::{Metadata, ResistanceUnit, StrainUnit};
 use crate::row::{Reading, ReadingKind, ReferenceQuantity, Row};
 
-/// Turns the cells of a line into a row; knows the time of the row before.
+/// Converts the cells of a line to a row; keeps the time of the previous row.
 pub(crate) struct RowParser {
     columns: Columns,
     conversion: Conversion,
@@ -20,7 +20,7 @@ struct Conversion {
     front_end: Option<FrontEnd<f64>>,
     joint: Option<Joint<f64>>,
     gauge_length_mm: f64,
-    /// Factors on a strain and a resistance in the file.
+    /// Factors on strain and resistance in the file.
     strain_factor: f64,
     ohm_factor: f64,
 }
@@ -56,7 +56,7 @@ impl RowParser {
         self.columns.temperature.is_some()
     }
 
-    /// The row of a line.
+    /// Returns the row of a line.
     pub(crate) fn row(&mut self, record: &StringRecord, line: u64) -> Result<Row, Fault> {
         if record.len() != self.columns.width {
             let expected = format!("{} cells, as in the header", self.columns.width);
@@ -76,7 +76,7 @@ impl RowParser {
                 Some(place) => cell::number(place.column.name(), place.cell(record))?,
                 None => f64::NAN,
             },
-            // Last: a line that is refused leaves the clock as it was.
+            // The clock comes last, so that a refused line leaves it unchanged.
             time_s: self.clock.read(self.columns.time.cell(record))?,
         })
     }
@@ -121,7 +121,7 @@ impl Conversion {
         })
     }
 
-    /// The reference, and its standard deviation if there is a column for it.
+    /// Returns the reference, and its standard deviation if there is a column for it.
     fn reference(
         &self,
         place: &ColumnPlace,
@@ -138,7 +138,7 @@ impl Conversion {
         let Some(sd) = sd.filter(|_| value.is_finite()) else { return Ok((converted(value), f64::NAN)) };
         let (name, text) = (sd.column.name(), sd.cell(record));
         let sd = cell::number(name, text)?;
-        // A missing one is none either.
+        // A missing standard deviation is also refused.
         if !(sd > 0.0) {
             return Err(Fault::in_column(name, "a positive standard deviation beside a known reference", quote(text)));
         }

@@ -2,8 +2,9 @@ use std::io::{self, Write};
 
 /// Writes rows of numbers as CSV, one at a time, without an allocation per cell.
 ///
-/// Numbers are the shortest that read back as the same `f64`, as `f64`'s `Display` has them (of two that are as short and as
-/// near, the even one), without exponents but for those below 1e-30 in size, which are nothing that was measured; a cell without a number stays empty. Nothing that is written here needs quotation marks.
+/// Numbers are the shortest that read back as the same `f64`, as by `f64`'s `Display` (of two that are equally short and near, the even
+/// one). Only magnitudes below 1e-30, smaller than any measured value, have exponents. A cell without a number stays empty. No output needs
+/// quotation marks.
 ///
 /// ```
 /// use ohmstrain_bench_data::RowWriter;
@@ -22,24 +23,24 @@ use std::io::{self, Write};
 #[derive(Debug)]
 pub struct RowWriter<W> {
     out: W,
-    /// The row so far, a comma behind every cell.
+    /// The row so far, with a comma after every cell.
     row: Vec<u8>,
 }
 
 impl<W: Write> RowWriter<W> {
-    /// Writes to `out` once per row: hand over something with a buffer.
+    /// Makes a writer that writes to `out` once per row; `out` should be buffered.
     pub const fn new(out: W) -> Self {
         Self { out, row: Vec::new() }
     }
 
-    /// A cell of text, which contains no comma, quotation mark or line end.
+    /// Adds a cell of text, which must not contain a comma, quotation mark or line end.
     pub fn text(&mut self, text: &str) {
         debug_assert!(!text.contains([',', '"', '\n', '\r']));
         self.row.extend_from_slice(text.as_bytes());
         self.row.push(b',');
     }
 
-    /// A cell with a number; an empty one for NaN.
+    /// Adds a cell with a number; an empty one for NaN.
     pub fn number(&mut self, value: f64) {
         if !value.is_nan() {
             append_number(&mut self.row, value);
@@ -47,7 +48,7 @@ impl<W: Write> RowWriter<W> {
         self.row.push(b',');
     }
 
-    /// A cell with words between which stands `|`.
+    /// Adds a cell with words separated by `|`.
     pub fn words<'a>(&mut self, words: impl Iterator<Item = &'a str>) {
         let start = self.row.len();
         for word in words {
@@ -65,7 +66,7 @@ impl<W: Write> RowWriter<W> {
     /// The error of `out`.
     pub fn end(&mut self) -> io::Result<()> {
         if self.row == b"," {
-            // A row of one empty cell would be a blank line, which readers pass over.
+            // A row of one empty cell would be a blank line, which readers skip.
             self.row.splice(.., *b"\"\",");
         }
         if let Some(last) = self.row.last_mut() {
@@ -76,7 +77,7 @@ impl<W: Write> RowWriter<W> {
         written
     }
 
-    /// Hands everything written so far on.
+    /// Flushes everything written so far.
     ///
     /// # Errors
     /// The error of the writer.
@@ -95,10 +96,10 @@ impl<W: Write> RowWriter<W> {
     }
 }
 
-/// Smallest magnitude that is written without an exponent: a smaller number is all but zero, and would be a line of hundreds of zeros.
+/// Smallest magnitude written without an exponent; smaller numbers are practically zero, and would be lines of hundreds of zeros.
 const TINY: f64 = 1e-30;
 
-/// A number that is not NaN as `f64`'s `Display` has it, several times faster; one below [`TINY`] with its exponent.
+/// Appends a number that is not NaN as by `f64`'s `Display`, several times faster; one below [`TINY`] with its exponent.
 #[inline]
 pub(crate) fn append_number(out: &mut Vec<u8>, value: f64) {
     if value.is_infinite() {
@@ -114,7 +115,7 @@ pub(crate) fn append_number(out: &mut Vec<u8>, value: f64) {
     }
 }
 
-/// `-1.25`, `-7` become `-0.000000125`: spreadsheets and scripts read numbers without exponents everywhere.
+/// Appends `-1.25`, `-7` as `-0.000000125`: numbers without exponents are readable by all spreadsheets and scripts.
 #[cold]
 fn append_without_exponent(out: &mut Vec<u8>, mantissa: &[u8], exponent: &[u8]) {
     let (negative, mantissa) = match mantissa.strip_prefix(b"-") {
@@ -135,7 +136,7 @@ fn append_without_exponent(out: &mut Vec<u8>, mantissa: &[u8], exponent: &[u8]) 
         out.extend(std::iter::repeat_n(b'0', power.saturating_sub(1)));
         out.extend(digits());
     } else {
-        // A mantissa has one digit before its point and at most 16 behind it; exponents are at least 16.
+        // A mantissa has one digit before its point and at most 16 after it; exponents are at least 16.
         out.extend(digits());
         out.extend(std::iter::repeat_n(b'0', (power + 1).saturating_sub(digits().count())));
     }
@@ -160,7 +161,7 @@ mod tests {
         for value in [f64::MAX, 1e-30, f64::INFINITY, f64::NEG_INFINITY, 123456789012345680.0] {
             assert_eq!(text(value), value.to_string());
         }
-        // What a baseline is after hours without a reading.
+        // A baseline reaches such values after hours without a reading.
         for value in [9.9e-31, -f64::MIN_POSITIVE, 5e-324, -2.5e-323] {
             assert_eq!(text(value), format!("{value:e}"));
         }
@@ -175,7 +176,7 @@ mod tests {
             if !value.is_nan() {
                 let text = text(value);
                 prop_assert_eq!(text.parse::<f64>().map(f64::to_bits), Ok(bits));
-                // The last of 17 digits may differ: of two that are as near, one is taken here and the other one there.
+                // Of two equally near candidates for the last of 17 digits, the two implementations may choose differently.
                 if value == 0.0 || value.abs() >= TINY {
                     prop_assert_eq!(text.len(), value.to_string().len());
                     prop_assert!(!text.contains(['e', 'E']));

@@ -4,7 +4,7 @@ use ohmstrain_model::Phase;
 
 use crate::order::{extent, median};
 
-/// A stretch of rows in one phase.
+/// A range of rows in one phase.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Segment {
     /// Phase of the body's motion.
@@ -13,15 +13,15 @@ pub struct Segment {
     pub rows: Range<usize>,
 }
 
-/// A rate counts as moving above this share of the typical one, if the reference is quiet enough to tell …
+/// Threshold of the rate for a movement, as a fraction of the typical rate, if the reference has little noise.
 const QUIET_SHARE: f64 = 0.02;
-/// … and above at most this share otherwise.
+/// Largest such threshold for noisy references.
 const NOISY_SHARE: f64 = 0.08;
-/// The noise of the rate must stay below the threshold by this factor.
+/// Factor by which the noise of the rate must stay below the threshold.
 const NOISE_MARGIN: f64 = 3.0;
-/// A segment must last this share of the time that a full stretch takes at the typical rate.
+/// Minimum duration of a segment, as a fraction of the time of a full stretch at the typical rate.
 const SHORTEST_SHARE: f64 = 0.12;
-/// A movement must go this share of a full stretch.
+/// Minimum distance of a movement, as a fraction of a full stretch.
 const SMALLEST_SHARE: f64 = 0.01;
 /// Widest window of the rate, rows to each side.
 const WIDEST: usize = 128;
@@ -29,10 +29,10 @@ const WIDEST: usize = 128;
 /// Cuts a reference into phases. The segments cover all rows, in order, and neighbours differ in phase.
 ///
 /// The rate is the slope of a straight line through a window of rows, which is widened until the reference's own noise
-/// no longer reaches the threshold. The threshold is 2 to 8 % of the *typical* rate, the one at which half the way is
-/// travelled, so that long holds do not count; the noise decides where between. What is shorter than the window, or
-/// than 12 % of the time of a full stretch, is no phase of its own and goes to its neighbours; a movement of less than
-/// 1 % of a full stretch is a hold. Missing values (NaN) are bridged by straight lines.
+/// no longer reaches the threshold. The threshold is 2 to 8 % of the *typical* rate, depending on the noise. The
+/// typical rate is that at which half the distance is travelled, so that long holds do not count. A part that is
+/// shorter than the window, or than 12 % of the time of a full stretch, is merged into its neighbours; a movement of
+/// less than 1 % of a full stretch is a hold. Missing values (NaN) are interpolated linearly.
 ///
 /// ```
 /// use ohmstrain_bench_data::segment;
@@ -62,7 +62,7 @@ pub fn segment(time_s: &[f64], strain: &[f64]) -> Vec<Segment> {
     segments
 }
 
-/// Motion of the body, as far as the noise lets it be seen.
+/// Motion of the body, to the extent that it exceeds the noise.
 struct VisibleMotion {
     rate: Vec<f64>,
     threshold: f64,
@@ -81,7 +81,7 @@ impl VisibleMotion {
             if half >= WIDEST || threshold <= NOISY_SHARE * typical {
                 let window_s = 2.0 * half as f64 * step_s;
                 let shortest_s = window_s.max(SHORTEST_SHARE * span(strain) / typical);
-                // What never moves has a typical rate of zero; the share is then NaN, which `max` passes over.
+                // Without motion the typical rate is zero; the fraction is then NaN, which `max` ignores.
                 return Self { rate, threshold, shortest_s };
             }
             half *= 2;
@@ -89,7 +89,7 @@ impl VisibleMotion {
     }
 }
 
-/// Values with gaps filled by straight lines; zeros if there is no value at all.
+/// Interpolates gaps linearly; returns zeros if there is no value at all.
 fn bridge(time_s: &[f64], values: &[f64]) -> Vec<f64> {
     let known: Vec<usize> = (0..values.len()).filter(|i| values[*i].is_finite()).collect();
     let mut out = values.to_vec();
@@ -105,10 +105,11 @@ fn bridge(time_s: &[f64], values: &[f64]) -> Vec<f64> {
     out
 }
 
-/// Standard deviation of the reference's noise, from how far each value lies off the line between its neighbours.
+/// Returns the standard deviation of the reference's noise, from the distance of each value from the line between its
+/// neighbours.
 ///
-/// The median leaves corners and steps out, and is scaled to a normal distribution. A resolution coarser than the noise
-/// makes most of them zero: then the mean of what is left of the lower nine tenths is taken.
+/// The median excludes corners and steps, and is scaled to a normal distribution. If the resolution is coarser than the
+/// noise, most distances are zero; then the mean of the lower nine tenths, without the zeros, is used.
 pub(crate) fn noise_sd(time_s: &[f64], values: &[f64]) -> f64 {
     let mut deviations: Vec<f64> = (1..values.len().saturating_sub(1))
         .map(|i| {
@@ -126,13 +127,13 @@ pub(crate) fn noise_sd(time_s: &[f64], values: &[f64]) -> f64 {
     (deviations[deviations.len() / 2] / 0.6745).max(mean)
 }
 
-/// Standard deviation of the slope of a line through `2 half + 1` values: `σ √(12 / n(n²-1)) / Δt`.
+/// Returns the standard deviation of the slope of a line through `2 half + 1` values: `σ √(12 / n(n²-1)) / Δt`.
 fn slope_sd(noise_sd: f64, half: usize, step_s: f64) -> f64 {
     let n = (2 * half + 1) as f64;
     noise_sd * (12.0 / (n * (n * n - 1.0))).sqrt() / step_s
 }
 
-/// Slope of the line through each row and `half` rows to both sides, fewer at the ends.
+/// Returns the slope of the line through each row and `half` rows to both sides, fewer at the ends.
 fn slopes(time_s: &[f64], values: &[f64], half: usize) -> Vec<f64> {
     (0..values.len())
         .map(|i| {
@@ -150,7 +151,7 @@ fn slopes(time_s: &[f64], values: &[f64], half: usize) -> Vec<f64> {
         .collect()
 }
 
-/// The rate at which half the way is travelled.
+/// Returns the rate at which half the distance is travelled.
 fn typical_rate(time_s: &[f64], rate: &[f64]) -> f64 {
     let mut ways: Vec<(f64, f64)> =
         (1..rate.len()).map(|i| (rate[i].abs(), rate[i].abs() * (time_s[i] - time_s[i - 1]))).collect();
@@ -177,7 +178,8 @@ fn runs(phases: impl Iterator<Item = Phase>) -> Vec<Segment> {
     out
 }
 
-/// Makes holds of movements that go nowhere, such as the sway of a body at rest, and joins them to holds beside them.
+/// Converts movements that go nowhere, such as the sway of a body at rest, to holds, and joins them with neighbouring
+/// holds.
 fn still_small(segments: &mut Vec<Segment>, strain: &[f64]) {
     let smallest = SMALLEST_SHARE * span(strain);
     for segment in segments.iter_mut() {
@@ -194,7 +196,7 @@ fn still_small(segments: &mut Vec<Segment>, strain: &[f64]) {
     });
 }
 
-/// Gives segments that are too short to their neighbours, the shortest first; between two phases it is split.
+/// Merges segments that are too short into their neighbours, the shortest first; one between two others is split.
 fn merge_short(segments: &mut Vec<Segment>, time_s: &[f64], shortest_s: f64) {
     let end_s = |row: usize| time_s[row.min(time_s.len() - 1)];
     let duration = |segment: &Segment| end_s(segment.rows.end) - time_s[segment.rows.start];

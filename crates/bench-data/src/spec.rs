@@ -5,7 +5,7 @@ use ohmstrain_model::{ConstantCurrent, Divider, FrontEnd, Joint, ParameterError,
 
 use crate::error::{SpecError, quote};
 
-/// A front end as it is written in files and flags; [`build`](Self::build) makes the model's.
+/// A front end as written in files and flags; [`build`](Self::build) makes the corresponding model.
 ///
 /// ```
 /// use ohmstrain_bench_data::FrontEndSpec;
@@ -43,10 +43,10 @@ pub enum FrontEndSpec {
 }
 
 impl FrontEndSpec {
-    /// The front end that converts codes.
+    /// Makes the front end that converts codes.
     ///
     /// # Errors
-    /// Names the parameter that no front end can have.
+    /// Names the invalid parameter.
     pub fn build(&self) -> Result<FrontEnd<f64>, ParameterError> {
         match *self {
             Self::Divider { reference_ohm, side, bits, noise_codes } => {
@@ -58,7 +58,7 @@ impl FrontEndSpec {
         }
     }
 
-    /// Resolution of the converter.
+    /// Returns the resolution of the converter, bits.
     #[must_use]
     pub const fn bits(&self) -> u32 {
         match *self {
@@ -66,7 +66,7 @@ impl FrontEndSpec {
         }
     }
 
-    /// Standard deviation of the converter's own noise, codes.
+    /// Returns the standard deviation of the converter's own noise, codes.
     #[must_use]
     pub const fn noise_codes(&self) -> f64 {
         match *self {
@@ -127,7 +127,7 @@ impl fmt::Display for FrontEndSpec {
     }
 }
 
-/// A joint as it is written in files and flags: `prestrain=0.05 moment_arm_mm=4.4 gauge_length_mm=30`.
+/// A joint as written in files and flags: `prestrain=0.05 moment_arm_mm=4.4 gauge_length_mm=30`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointSpec {
     /// Strain at angle zero.
@@ -139,10 +139,10 @@ pub struct JointSpec {
 }
 
 impl JointSpec {
-    /// The joint that maps angles to strains.
+    /// Makes the joint that maps angles to strains.
     ///
     /// # Errors
-    /// Names the parameter that no joint can have.
+    /// Names the invalid parameter.
     pub fn build(&self) -> Result<Joint<f64>, ParameterError> {
         Joint::new(self.prestrain, self.moment_arm_mm, self.gauge_length_mm)
     }

@@ -6,8 +6,7 @@ use crate::metadata::Metadata;
 use crate::reader::TraceReader;
 use crate::row::{ReadingKind, ReferenceQuantity, Row};
 
-/// Rows that a recording in memory may have, and a file that is imported: nine hours at 1 kHz. What is read row by row has no
-/// such bound.
+/// Largest number of rows in a recording in memory, or in an imported file: nine hours at 1 kHz. Reading row by row has no such bound.
 pub const MOST_ROWS: usize = 1 << 25;
 
 /// The sensor's readings, one per row.
@@ -21,18 +20,18 @@ pub struct Readings {
     pub converter: Option<ConverterReadings>,
 }
 
-/// Data of a converter's codes beyond the resistance, one entry per row.
+/// Data of a converter's readings beyond the resistance, one entry per row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ConverterReadings {
     /// The codes; `None` is a missing one.
     pub codes: Vec<Option<u32>>,
     /// Standard deviation of the reading, Ω; NaN where the reading is missing.
     pub sd_ohm: Vec<f64>,
-    /// True if the code stood at an end of the scale; the reading is then missing.
+    /// True if the code was at an end of the scale; the reading is then missing.
     pub saturated: Vec<bool>,
 }
 
-/// Reference to judge the sensor by, one value per row.
+/// Reference for judging the sensor, one value per row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reference {
     /// Quantity of the values.
@@ -43,7 +42,7 @@ pub struct Reference {
     pub sd: Vec<f64>,
 }
 
-/// A recording: readings over time, perhaps with a reference. All vectors have the same length.
+/// A recording: readings over time, with an optional reference. All vectors have the same length.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trace {
     /// Metadata of the recording.
@@ -59,7 +58,7 @@ pub struct Trace {
 }
 
 impl Trace {
-    /// Reads a whole recording. `name` is what messages call the source.
+    /// Reads a whole recording. `name` is the source's name in messages.
     ///
     /// # Errors
     /// [`TraceError`] if the source fails, or is not a trace with at least one row.
@@ -67,7 +66,7 @@ impl Trace {
         Self::collect(TraceReader::new(source, name)?)
     }
 
-    /// Reads what is left in `rows`.
+    /// Reads the remaining rows of `rows`.
     ///
     /// # Errors
     /// The first error of `rows`, or [`TraceError::Content`] if there is no row.
@@ -138,19 +137,19 @@ impl Trace {
         self.time_s.is_empty()
     }
 
-    /// The rows with `time_s < end_s`.
+    /// Returns the rows with `time_s < end_s`.
     #[must_use]
     pub fn until(&self, end_s: f64) -> Self {
         self.rows(0..self.time_s.partition_point(|time| *time < end_s))
     }
 
-    /// The rows with `time_s >= start_s`.
+    /// Returns the rows with `time_s >= start_s`.
     #[must_use]
     pub fn since(&self, start_s: f64) -> Self {
         self.rows(self.time_s.partition_point(|time| *time < start_s)..self.len())
     }
 
-    /// Returns some of the rows; rows beyond the last one are passed over.
+    /// Returns some of the rows; rows beyond the last one are ignored.
     #[must_use]
     pub fn rows(&self, range: Range<usize>) -> Self {
         fn cut<T: Clone>(values: &[T], range: &Range<usize>) -> Vec<T> {

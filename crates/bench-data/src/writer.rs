@@ -8,8 +8,8 @@ use crate::trace::Trace;
 impl Trace {
     /// Writes the recording in the schema that [`Trace::read`] reads: metadata lines, header, rows.
     ///
-    /// Numbers are written with as many digits as bring them back exactly. Readings that came from a converter are
-    /// written as its codes, displacements and angles that became strains are written as strains.
+    /// Numbers have as many digits as are needed to read them back exactly. Readings from a converter are written as
+    /// its codes; displacements and angles that became strains are written as strains.
     ///
     /// # Errors
     /// The error of `out`.
@@ -59,7 +59,7 @@ impl Trace {
     }
 }
 
-/// A word rather than nothing, so that no row looks short.
+/// Missing value: a word rather than nothing, so that no row looks short.
 const MISSING: &str = "NaN";
 
 fn number(rows: &mut RowWriter<impl Write>, value: f64) {

@@ -1,4 +1,4 @@
-//! Faults are where they are said to be, and nowhere else.
+//! Faults occur where they are specified, and nowhere else.
 
 use ohmstrain_bench_data::Trace;
 use ohmstrain_bench_data::faults::{Episode, Fault};
@@ -51,8 +51,8 @@ fn a_fault_of_the_readings_changes_some_of_its_rows_and_no_other() {
     }
 }
 
-/// 200 rows, of which a share p is hit: within five standard deviations, √(200 p (1 - p)), of 200 p; and other rows with
-/// another seed.
+/// A fraction p of 200 rows is hit, within five standard deviations, √(200 p (1 - p)), of 200 p; another seed hits other
+/// rows.
 #[test]
 fn shares_are_kept_by_chance() {
     let clean = trace();
@@ -88,7 +88,7 @@ fn a_fault_of_the_clock_keeps_rows_together() {
     let jittered = with(Fault::Jitter { share: 0.3 }, 1);
     assert!(jittered.time_s.windows(2).all(|pair| pair[0] < pair[1]));
     assert!(jittered.time_s[ROWS] != clean.time_s[ROWS] && jittered.readings == clean.readings);
-    // Ten seconds last twenty, and what comes after is ten later.
+    // Ten seconds last twenty, and later rows are ten seconds late.
     let fast = with(Fault::WrongRate { factor: 2.0 }, 1);
     let after = ROWS.end + 10;
     assert!((fast.time_s[after] - clean.time_s[after] - 9.95).abs() < 1e-9, "{}", fast.time_s[after]);
@@ -99,7 +99,7 @@ fn a_fault_of_the_clock_keeps_rows_together() {
     let (a, b) = (ROWS.start, ROWS.start + 1);
     assert_eq!((late.time_s[a], late.time_s[b]), (clean.time_s[b], clean.time_s[a]));
     assert_eq!(late.readings.values[a], clean.readings.values[b]);
-    // A sensor that slipped: the body is where it was, the sensor is not.
+    // The sensor has slipped: the body's strain is unchanged, the sensor's is not.
     let slipped = with(Fault::Slipped { by: 0.05 }, 1);
     assert_eq!(slipped.readings, clean.readings);
     assert!((strain(&slipped)[a] - strain(&clean)[a] - 0.05).abs() < 1e-15);

@@ -1,4 +1,4 @@
-//! The simulated sensors do what was published about real ones.
+//! The simulated sensors reproduce published findings on real ones.
 
 use std::fmt::Write as _;
 
@@ -17,7 +17,7 @@ fn hysteresis_grows_with_speed() {
     for bench in MATCHED.into_iter().chain([MISMATCHED]) {
         for elongation_mm in [5.0, 10.0] {
             let areas = [1.0, 2.0, 5.0].map(|speed| bench.loop_areas(elongation_mm, speed));
-            // Cycled for long, the mismatched sensor has no paths left to break at any speed.
+            // After many cycles, the mismatched sensor has no paths left to break at any speed.
             let cycles = if bench.mismatched { 1 } else { 2 };
             for cycle in 0..cycles {
                 let areas = areas.map(|both| both[cycle]);
@@ -107,7 +107,7 @@ fn resistance_drops_beyond_40_g() {
     assert!((6..=7).contains(&highest), "highest at {} g", 5 * (highest + 1));
 }
 
-/// R/R₀ at the end of each load step: just before the strain rises again.
+/// Returns R/R₀ at the end of each load step, just before the strain rises again.
 fn settled_by_load(curve: &Curve) -> Vec<f64> {
     let rising = |i: usize| curve.strain[i + 1] > curve.strain[i];
     let mut out: Vec<f64> = (1..curve.strain.len() - 1)
@@ -118,8 +118,8 @@ fn settled_by_load(curve: &Curve) -> Vec<f64> {
     out
 }
 
-/// Root mean square residuals of the best one and the best two exponentials over a constant, over 290 s of hold, by
-/// brute force over a grid of time constants.
+/// Returns the root mean square residuals of the best one and the best two exponentials over a constant, over 290 s of
+/// hold, by brute force over a grid of time constants.
 fn exponential_residuals(hold: &LongHold) -> (f64, f64) {
     let times: Vec<f64> = (0..580).map(|i| 0.5 * f64::from(i)).collect();
     let values: Vec<f64> = times.iter().map(|t| hold.curve.at(hold.start_s + t)).collect();
@@ -136,7 +136,7 @@ fn exponential_residuals(hold: &LongHold) -> (f64, f64) {
     (one, two)
 }
 
-/// Root mean square of what Gram-Schmidt leaves of `values`.
+/// Returns the root mean square of the part of `values` that Gram-Schmidt leaves.
 fn residual(values: &[f64], basis: &[&Vec<f64>]) -> f64 {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
     let mut orthogonal: Vec<Vec<f64>> = Vec::new();
@@ -155,7 +155,7 @@ fn residual(values: &[f64], basis: &[&Vec<f64>]) -> f64 {
     (dot(&rest, &rest) / values.len() as f64).sqrt()
 }
 
-/// `OHMSTRAIN_UPDATE=1 cargo test -p ohmstrain-bench-data --test all findings::` writes the table anew.
+/// The command `OHMSTRAIN_UPDATE=1 cargo test -p ohmstrain-bench-data --test all findings::` rewrites the table.
 #[test]
 fn the_table_in_the_documentation_is_what_the_simulator_does() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/preset-findings.md");

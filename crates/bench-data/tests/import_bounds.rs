@@ -1,4 +1,4 @@
-//! Files that ask for more memory than there is, records over several lines, and names whose end is no unit.
+//! Files that require more memory than there is, records over several lines, and names whose last part is not a unit.
 
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -11,7 +11,7 @@ fn read(bytes: Vec<u8>, name: &str) -> Result<Table, ImportError> {
     read_table(bytes, name, &Recipe::default().read_options(0))
 }
 
-/// A small table, and a cell somewhere else.
+/// Returns a workbook with a small table, and optionally a cell far away.
 fn workbook(far: Option<(u32, u16)>) -> Vec<u8> {
     let mut workbook = Workbook::new();
     let sheet = workbook.add_worksheet();
@@ -33,20 +33,20 @@ fn workbook(far: Option<(u32, u16)>) -> Vec<u8> {
     workbook.save_to_buffer().unwrap()
 }
 
-/// The last cell that a sheet may have makes a table of 17 billion; one far below, or to the right, fewer.
+/// The last possible cell of a sheet would make a table of 17 billion cells; one far below, or to the right, fewer.
 #[test]
 fn a_stray_cell_takes_no_memory() {
     assert!(read(workbook(None), "rig.xlsx").is_ok());
     for far in [(1_048_575, 16_383), (1_048_575, 2), (3, 16_383), (500_000, 9_000)] {
         match read(workbook(Some(far)), "rig.xlsx") {
-            // Rows between that are empty are left out.
+            // Empty rows in between are left out.
             Ok(table) => assert!(Plan::propose(&[table], &Recipe::default()).is_ok(), "{far:?}"),
             Err(error) => assert!(error.to_string().contains("rig.xlsx"), "{far:?}: {error}"),
         }
     }
 }
 
-/// A gigabyte and more of zeros in a megabyte.
+/// More than a gigabyte of zeros in a megabyte.
 #[test]
 fn a_gzip_bomb_is_refused() {
     let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::best());
@@ -63,7 +63,7 @@ fn metadata_without_end_is_refused() {
     assert!(error.to_string().contains("at most 1000 lines"), "{error}");
 }
 
-/// A record ends where one of its labels comes again, with a line between records or without.
+/// A record ends where one of its labels is repeated, with or without a line between records.
 #[test]
 fn a_record_over_several_lines_is_one_row() {
     for (end, separator) in [("---\n", ": "), ("", ": "), ("\n", " = "), ("", "=")] {
@@ -84,7 +84,7 @@ fn a_record_over_several_lines_is_one_row() {
     }
 }
 
-/// The end of a name is a unit only where it cannot be an index.
+/// The last part of a name is a unit only if it cannot be an index.
 #[test]
 fn an_index_is_no_unit() {
     let table = |strain: &str, scale: f64| {

@@ -1,4 +1,4 @@
-//! Two files with two clocks: the offset is found by the motion, with an uncertainty that holds.
+//! Two files with two clocks: the offset is found by the motion, with a correct uncertainty.
 
 use std::fmt::Write as _;
 
@@ -24,7 +24,7 @@ fn table(text: String, name: &str) -> Table {
     read_table(text.into_bytes(), name, &Recipe::default().read_options(0)).unwrap()
 }
 
-/// The readings as one file, the reference as another whose clock shows `offset_s` less.
+/// Returns the readings as one file, the reference as another whose clock shows `offset_s` less.
 fn files(trace: &Trace, offset_s: f64) -> [Table; 2] {
     let (mut readings, mut reference) = ("Time (s),R (Ohm)\n".to_owned(), "t [s];Position [mm]\n".to_owned());
     let strain = &trace.reference.as_ref().unwrap().values;
@@ -47,7 +47,7 @@ fn the_motion_brings_two_clocks_together() {
             let lag = imported.lag.unwrap();
             let seconds = -lag.lag_s;
             println!("seed {seed}: {truth} s found as {seconds:.3} ± {:.3} s", lag.sd_s);
-            // Three standard deviations, and what the sensor's own relaxation looks like: half a row of 0.1 s.
+            // Three standard deviations, and the apparent lag by the sensor's own relaxation: half a row of 0.1 s.
             assert!((seconds - truth).abs() < 3.0 * lag.sd_s + 0.05, "{lag:?} {truth}");
             assert!(lag.sd_s < 0.1, "{lag:?}");
         }
@@ -105,8 +105,8 @@ fn a_survey_tells_what_a_recording_is_like() {
     assert!(survey.phases.unwrap().phases.iter().all(|(count, _)| *count > 0));
 }
 
-/// Two to five like bends, fifty rows a second, on two clocks: angles, and readings that follow them with some noise. Shifted by a
-/// bend they fit as well, but for the one that is lost.
+/// Two to five similar bends, fifty rows a second, on two clocks: angles, and readings that follow them with some noise. Shifted by one
+/// bend they fit equally well, except for the bend that is lost.
 #[test]
 fn like_movements_are_not_shifted_by_one() {
     let bend = |t: f64, k: i32| {

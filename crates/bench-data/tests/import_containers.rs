@@ -1,4 +1,4 @@
-//! Workbooks and Parquet files that the test writes with other people's libraries.
+//! Workbooks and Parquet files that the test writes with third-party libraries.
 
 use std::io::Write as _;
 use std::sync::Arc;
@@ -33,7 +33,7 @@ fn import(bytes: Vec<u8>, recipe: &Recipe) -> Trace {
     Plan::new(&tables, &proposed).unwrap().import(&tables).unwrap().trace
 }
 
-/// Times to `tolerance_s`; the rest to one rounding, of the unit.
+/// Compares times to `tolerance_s`, other values to one rounding of the unit.
 fn has_the_numbers(trace: &Trace, tolerance_s: f64) {
     assert_eq!(trace.len(), ROWS);
     for row in 0..ROWS {
@@ -71,11 +71,11 @@ fn workbook(dates: bool) -> Vec<u8> {
 #[test]
 fn a_workbook_with_its_data_on_one_sheet() {
     has_the_numbers(&import(workbook(false), &Recipe::default()), 0.0);
-    // A date is a number of days: 45 413 of them have steps of 7e-12 d, 0.6 µs, and are read to the microsecond.
+    // A date is a number of days: 45 413 days have steps of 7e-12 d, 0.6 µs, and are read to the microsecond.
     has_the_numbers(&import(workbook(true), &Recipe::default()), 1.5e-6);
 }
 
-/// Numbers in a workbook have no decimal mark: the one of its texts is none of theirs.
+/// Numbers in a workbook have no decimal mark; that of its texts does not apply to them.
 #[test]
 fn a_decimal_comma_is_for_texts_of_a_workbook() {
     let known = Recipe { decimal: vec![",".parse().unwrap()], ..Recipe::default() };
@@ -99,7 +99,7 @@ fn two_sheets_of_numbers_are_a_question() {
     assert!(read_table(bytes, "lab.xlsx", &known.read_options(0)).is_ok());
 }
 
-/// Time in microseconds, kΩ and strain.
+/// Returns a file with time in microseconds, kΩ and strain.
 fn parquet(compression: Compression) -> Vec<u8> {
     let schema = "message lab { REQUIRED INT64 time (TIMESTAMP(MICROS, true)); OPTIONAL DOUBLE R_kohm; OPTIONAL DOUBLE strain; }";
     let schema = Arc::new(parse_message_type(schema).unwrap());
@@ -129,7 +129,7 @@ fn parquet_as_most_programs_write_it() {
     }
 }
 
-/// Whatever byte is wrong, a table comes out or one line that says what is wrong.
+/// Whatever byte is wrong, the result is a table or a one-line error.
 #[test]
 fn a_damaged_parquet_file_is_no_panic() {
     let whole = parquet(Compression::SNAPPY);
@@ -144,7 +144,7 @@ fn a_damaged_parquet_file_is_no_panic() {
     }
 }
 
-/// Files in a zip archive.
+/// Returns files in a zip archive.
 fn zip(files: &[(&str, &[u8])]) -> Vec<u8> {
     let mut writer = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
     for (name, content) in files {
@@ -170,7 +170,7 @@ fn a_file_in_a_zip_archive() {
     has_the_numbers(&import(two, &known), 0.0);
 }
 
-/// An array as NumPy writes it.
+/// Returns an array as NumPy writes it.
 fn numpy(shape: &str, numbers: impl Iterator<Item = f64>) -> Vec<u8> {
     let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}\n");
     let data: Vec<u8> = numbers.flat_map(f64::to_le_bytes).collect();

@@ -1,4 +1,4 @@
-//! Several channels of one file in one recording: paired by their names, by flags, or asked for.
+//! Several channels of one file in one recording, paired by their names, by flags, or by a question.
 
 use ohmstrain_bench_data::import::{ColumnName, EachPlan, EachTrace, ImportError, Recipe, Role, Table, read_table};
 
@@ -10,12 +10,13 @@ fn name(text: &str) -> ColumnName {
     text.parse().unwrap()
 }
 
-/// Three rows under a header: times in steps of 50 ms, readings from 1000 on, references from 0 on, each column its own.
+/// Returns three rows under a header: times in steps of 50 ms, readings from 1000 on, references from 0 on, different
+/// in each column.
 fn rows(header: &str) -> String {
     let columns = header.split(',').count();
     let cell = |row: usize, column: usize| match column {
         0 => (50 * row).to_string(),
-        // Readings come first.
+        // Readings are the first columns.
         1 | 2 if columns > 3 => (1000 * column + row).to_string(),
         1 => (1000 + row).to_string(),
         column => (10 * column * row).to_string(),
@@ -57,7 +58,7 @@ fn references_share_the_stem_of_their_channel() {
         assert_eq!(values("thumb_ohm"), &[thumb, thumb + 1.0, thumb + 2.0], "{header}");
         assert_eq!(values("thumb_angle_deg"), &[0.0, 30.0, 60.0], "{header}");
     }
-    // Numbers pair, too; a channel keeps the letter before its number.
+    // Numbers also pair; a channel keeps the letter before its number.
     let degrees = Recipe { units: vec![(Role::Angle, "deg".into())], ..none };
     columns(
         "time_ms,R1,R2,theta1,theta2",

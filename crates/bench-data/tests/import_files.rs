@@ -1,4 +1,4 @@
-//! Files as labs write them, and what is made of them: proposed an import, imported as proposed, compared to the last bit.
+//! Files as labs write them, and their import: proposed, performed as proposed, and compared to the last bit.
 
 use std::fmt::Write as _;
 
@@ -10,7 +10,7 @@ pub struct Truth {
     pub time_ms: Vec<i64>,
     /// Tenths of an ohm.
     decaohm: Vec<i64>,
-    /// Hundredths of a percent, and of a millimetre on 100 mm.
+    /// Hundredths of a percent, equal to hundredths of a millimetre on 100 mm.
     strain: Vec<i64>,
 }
 
@@ -37,14 +37,14 @@ impl Truth {
     }
 }
 
-/// A whole number of 10^-`digits` as text: `1600.1`.
+/// Writes a whole number of 10^-`digits` as text: `1600.1`.
 pub fn decimal(value: i64, digits: usize, mark: char) -> String {
     let text = format!("{:0>width$}", value, width = digits + 1);
     let (whole, fraction) = text.split_at(text.len() - digits);
     if digits == 0 { text } else { format!("{whole}{mark}{fraction}") }
 }
 
-/// A file with these lines above the rows; a row is made of time in ms, tenths of an ohm, hundredths of a percent.
+/// Returns a file with these lines above the rows; a row is made from time in ms, tenths of an ohm, hundredths of a percent.
 pub fn file(above: &str, row: impl Fn(i64, i64, i64) -> String) -> String {
     let truth = truth();
     let mut out = above.to_owned();
@@ -76,7 +76,7 @@ pub fn proposed(files: &[(&str, Vec<u8>)], known: &Recipe) -> Result<(Recipe, Im
     Ok((recipe, imported))
 }
 
-/// The file is imported as proposed, to the last bit of its numbers.
+/// Checks that the file is imported as proposed, to the last bit of its numbers.
 #[track_caller]
 pub fn is_imported(name: &str, bytes: impl Into<Vec<u8>>, known: &Recipe) -> Imported {
     let (_, imported) = proposed(&[(name, bytes.into())], known).unwrap_or_else(|error| panic!("{error}"));
@@ -87,7 +87,7 @@ pub fn is_imported(name: &str, bytes: impl Into<Vec<u8>>, known: &Recipe) -> Imp
     let strain = &trace.reference.as_ref().unwrap().values;
     assert_eq!(strain.len(), truth.strain.len());
     for (found, expected) in strain.iter().zip(truth.strain()) {
-        // A displacement is rounded when it is read and when it is divided; what is a strain already, once.
+        // A displacement is rounded when it is read and when it is divided; a strain only once.
         let roundings =
             if known.gauge_length_mm.is_some() || trace.metadata.gauge_length_mm.is_some() { 1.0 } else { 0.0 };
         assert!((found - expected).abs() <= roundings * f64::EPSILON * expected, "{name}: {found} {expected}");
@@ -102,7 +102,7 @@ pub fn asks(files: &[(&str, &str)], known: &Recipe, words: &[&str]) {
     assert!(words.iter().all(|word| error.contains(word)) && error.lines().count() == 1, "{error}");
 }
 
-/// Three cells with commas between them: s, Ω, percent.
+/// Returns three cells separated by commas: s, Ω, percent.
 pub fn seconds_ohms_percent(ms: i64, ohm: i64, strain: i64) -> String {
     format!("{},{},{}", decimal(ms, 3, '.'), decimal(ohm, 1, '.'), decimal(strain, 2, '.'))
 }

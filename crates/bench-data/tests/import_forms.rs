@@ -1,5 +1,5 @@
-//! The forms in which labs export recordings: each is proposed an import without a question (or with the one that it
-//! leaves), the import takes the proposal, and the trace has the numbers that the file was made of.
+//! Forms in which labs export recordings. An import of each is proposed without a question (or with the one that the
+//! file leaves open), the import accepts the proposal, and the trace has the numbers of the file.
 
 use std::io::Write as _;
 
@@ -30,7 +30,7 @@ fn two_header_lines_and_a_line_of_units_below_a_preamble() {
     let row = |ms, ohm, strain| format!("{},{},{}", ms, decimal(ohm, 4, '.'), decimal(strain, 2, '.'));
     let above = "Rig 7\nOperator: N. N.\n\nClock,DMM,Stage\nTime,Resistance,Position\nms,kΩ,mm\n";
     is_imported("rig.csv", file(above, row), &gauge_100());
-    // The names may stand in the upper line; where it has none, the lower one's counts.
+    // Names may be in the upper line; where it has none, the lower line applies.
     let above = "Rig 7\n\nTime,Resistance,Extension\nChannel 1,DMM,Channel 2\n(ms),(kΩ),(mm)\n";
     is_imported("upper.csv", file(above, row), &gauge_100());
     let above = "Time,,Extension\nClock,Resistance,Channel 2\n(ms),(kΩ),(mm)\n";
@@ -165,7 +165,7 @@ fn what_nothing_decides_is_asked_with_the_answer() {
     let signs = file("time_ms,R_ohm\n", |ms, ohm, _| format!("{ms},{}", decimal(ohm, 1, '.')));
     let back = signs.clone() + "3,1600\n";
     asks(&[("a.csv", &back)], &nothing, &["a.csv:62", "expected a time after"]);
-    // Minutes to nine decimals: what multiplying them with 60 adds is no digit of the file's.
+    // Minutes to nine decimals: multiplication by 60 adds digits that the file does not have.
     let minutes = |k: u32| format!("{:.9},{}\n", f64::from(k) * 0.097 / 60.0, 1600 + k % 7);
     let back = format!("time_min,R_ohm\n{}{}", (0..62).map(minutes).collect::<String>(), minutes(11));
     asks(&[("a.csv", &back)], &nothing, &["a.csv:64", "expected a time after 5.917 s, found 1.067 s"]);
@@ -177,16 +177,16 @@ fn words_beside_numbers_above_the_names_are_no_data() {
     for above in ["Sample,7,\nDate,2024-05-13,\n", "Channels,2,\nX0,0.0,0.0\n***End***\n\n", "sep=,\n"] {
         is_imported("above.csv", file(&format!("{above}{names}"), seconds_ohms_percent), &Recipe::default());
     }
-    // LabVIEW has a name for remarks, and rows without them.
+    // LabVIEW has a name for a column of remarks, and rows without them.
     let above = "Separator\tTab\nX0\t0.0\t0.0\n***End_of_Header***\nX_Value\tR (Ohm)\tStrain (%)\tComment\n";
     let row = |ms, ohm, strain| seconds_ohms_percent(ms, ohm, strain).replace(',', "\t");
     is_imported("rig.lvm", file(above, row), &Recipe::default());
-    // R's write.table has a cell for the number of the row, and no name for it.
+    // R's write.table has a cell for the row number, without a name.
     let row = |ms, ohm, strain| {
         format!("\"{}\" {}", (ms - 200) / 50, seconds_ohms_percent(ms, ohm, strain).replace(',', " "))
     };
     is_imported("frame.txt", file("\"time_s\" \"R_ohm\" \"strain_percent\"\n", row), &Recipe::default());
-    // Neither is a first row that lacks its last cell the header's end.
+    // A first row that lacks its last cell is not part of the header either.
     let row = |ms, ohm, strain| {
         let row = seconds_ohms_percent(ms, ohm, strain);
         if ms == 250 { row[..row.rfind(',').unwrap()].to_owned() } else { row }
@@ -206,7 +206,7 @@ fn what_stands_behind_the_data_is_passed_over_and_said() {
             "\nMax R,1700\nMean,1650.2,20.1\n",
             "2 lines among or behind the data passed over, of which the first is line 63",
         ),
-        // Cut in the middle of a number.
+        // Truncated in the middle of a number.
         ("3.3,16", "1 line among or behind the data passed over, which is line 62"),
     ] {
         let imported = is_imported("behind.csv", format!("{text}{behind}"), &Recipe::default());

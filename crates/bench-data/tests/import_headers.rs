@@ -1,4 +1,4 @@
-//! Headers that do not fit the data, and tables that lie on their side.
+//! Headers that do not fit the data, and transposed tables.
 
 use ohmstrain_bench_data::import::Recipe;
 
@@ -20,7 +20,7 @@ fn names_that_are_numbers_are_names() {
         [("time", "s"), ("resistance", "ohm"), ("strain", "percent")],
     );
     is_imported("channels.csv", file("time;4;9\n", row), &known);
-    // `2` is the name of a column, not the second one.
+    // `2` is the name of a column, not an index.
     let known = of_columns(
         [("time", "stretch_id"), ("resistance", "3"), ("strain", "2")],
         [("time", "s"), ("resistance", "ohm"), ("strain", "percent")],
@@ -28,7 +28,7 @@ fn names_that_are_numbers_are_names() {
     is_imported("swapped.csv", file("stretch_id;3;2\n", row), &known);
     let named = file("sample;1;2\n", row);
     asks(&[("a.csv", &named)], &Recipe::default(), &["`sample`, `1`, `2`", "--column resistance=NAME"]);
-    // pandas counts columns that have no names.
+    // pandas numbers columns without names.
     let counted = file("0;1;2\n", row);
     let known = of_columns(
         [("time", "0"), ("resistance", "1"), ("strain", "2")],
@@ -46,7 +46,7 @@ fn fewer_or_more_names_than_columns_are_those_of_the_first() {
     let names = "Time (s),R (Ohm),Strain (%),Operator,Temperature (°C)\n";
     let imported = is_imported("more.csv", file(names, seconds_ohms_percent), &Recipe::default());
     assert!(imported.remarks.iter().any(|remark| remark.contains("5 names above 3 columns")), "{:?}", imported.remarks);
-    // Prose is no header.
+    // Prose is not a header.
     let prose = file("Strain gauge of the second batch, glued\n", row);
     asks(&[("a.csv", &prose)], &Recipe::default(), &["no header"]);
 }
@@ -70,7 +70,7 @@ fn an_index_behind_a_name_is_no_unit() {
     asks(&[("a.csv", &text)], &Recipe::default(), &["`strain_2`", "--unit strain=percent"]);
 }
 
-/// Lines of columns: labels, and then all numbers.
+/// Returns columns as lines: labels, followed by all numbers.
 fn on_its_side(labels: [&str; 3], separator: &str) -> String {
     let truth = truth();
     let joined = |label: &str, numbers: Vec<String>| format!("{label}{separator}{}\n", numbers.join(separator));

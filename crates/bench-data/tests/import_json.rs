@@ -19,7 +19,7 @@ fn an_object_for_each_row() {
     is_imported("run.json", format!("[{}]", list.trim_end().trim_end_matches(',')), &Recipe::default());
     let pretty = file("", |ms, ohm, strain| object(ms, ohm, strain).replace(", ", ",\n  "));
     is_imported("pretty.json", pretty, &Recipe::default());
-    // A board says something else, too.
+    // A board also prints other text.
     let mixed = file("{\"boot\": \n", object);
     is_imported("mixed.jsonl", mixed, &Recipe::default());
 }

@@ -4,7 +4,8 @@ use ohmstrain_bench_data::import::{Plan, Recipe};
 
 use crate::import_files::{asks, decimal, file, proposed, tables, truth};
 
-/// Three recordings, one below the other, the last one with other readings; each row has the number of its trial.
+/// Returns three recordings, one below the other, the last one with other readings; each row has the number of its
+/// trial.
 fn stacked(is_numbered: bool) -> String {
     let trial = |number: i64| {
         file("", |ms, ohm, strain| {
@@ -52,7 +53,7 @@ fn all_recordings_are_taken_apart() {
             assert_eq!(plan.import(recording).unwrap().trace.time_s, truth().time_s());
         }
     }
-    // Rows that are out of order are no recordings.
+    // Rows that are out of order are not recordings.
     let text = "t (s);R (Ohm)\n0.0;700\n0.1;701\n0.2;702\n0.1;703\n0.05;704\n0.3;705\n0.4;706\n";
     let tables = tables(&[("runs.csv", text.into())], &Recipe::default()).unwrap();
     let error = Plan::new(&tables, &Recipe::default()).unwrap().recordings(&tables).unwrap_err().to_string();

@@ -1,4 +1,4 @@
-//! The files of a rig that is known by its columns: two rows a reading, a position with a clock of its own.
+//! Files of a rig that is recognised by its columns: two rows per reading, a position with its own clock.
 
 use std::fmt::Write as _;
 
@@ -9,7 +9,8 @@ use crate::import_files::{proposed, tables};
 /// The rig's irregular steps, s.
 const STEPS: [f64; 5] = [0.08, 0.08, 0.08, 0.125, 0.19];
 
-/// A file of the rig: resistance rises by 10 Ω a second, the position goes up and down with corners every fifty rows.
+/// Returns a file of the rig: resistance rises by 10 Ω a second, the position goes up and down with corners every fifty
+/// rows.
 fn rig(rows: usize, spurious: &[usize]) -> String {
     let mut out = String::new();
     for (row, time) in times(rows).into_iter().enumerate() {
@@ -33,7 +34,7 @@ fn times(rows: usize) -> Vec<f64> {
         .collect()
 }
 
-/// mm; straight between rows that are multiples of fifty.
+/// Returns the position, mm, linear between rows that are multiples of fifty.
 fn position(row: usize) -> f64 {
     let times = times(row / 50 * 50 + 51);
     let (from, to) = (row / 50 * 50, row / 50 * 50 + 50);
@@ -57,10 +58,10 @@ fn a_rig_without_header_is_folded_and_interpolated() {
     let corner = |k: usize| [0, 49].contains(&(k % 50));
     for k in 0..199 {
         let time = 0.5 * (times[k] + times[k + 1]);
-        // Sums of numbers up to 2000 and 30, printed to 17 digits: a few units in the last place.
+        // Sums of numbers up to 2000 and 30, printed to 17 digits, are accurate to a few units in the last place.
         assert!((trace.time_s[k] - time).abs() < 1e-13);
         assert!((trace.readings.values[k] - (1600.0 + 10.0 * time)).abs() < 2e-12, "row {k}");
-        // The position's clock is 0.03 s late: on one straight it reads what the motion says at its own time.
+        // The position's clock is 0.03 s late; away from corners the position is that of the motion at its own time.
         if k > 0 && !corner(k) {
             let (a, b) = (times[k] + 0.03, times[k + 1] + 0.03);
             let exact = position(k) + (position(k + 1) - position(k)) * (time - a) / (b - a);

@@ -1,4 +1,4 @@
-//! The clocks of lab files: dates and times of day, counters that start again, a spreadsheet's days.
+//! Clocks of lab files: dates and times of day, counters that restart, a spreadsheet's days.
 
 use ohmstrain_bench_data::import::{Plan, Recipe};
 
@@ -10,7 +10,7 @@ fn time_stamps() {
         |ms: i64| format!("{:02}:{:02}:{:02}.{:03}", ms / 3_600_000 % 24, ms / 60_000 % 60, ms / 1000 % 60, ms % 1000);
     let rest = |ohm, strain| format!("{},{}", decimal(ohm, 1, '.'), decimal(strain, 2, '.'));
     let names = "Timestamp,R_ohm,strain_pct\n";
-    // Just before midnight, so that a day goes by.
+    // Just before midnight, so that the date changes.
     let noon = 86_400_000 - 1000;
     type Stamp<'a> = (&'a str, &'a dyn Fn(i64) -> String);
     let forms: [Stamp; 5] = [
@@ -69,9 +69,9 @@ fn clocks_of_spreadsheets_scanners_and_computers() {
         format!("{},{}", decimal(epoch(ms), 3, '.'), rest(ohm, strain))
     });
     let (_, imported) = proposed(&[("epoch", text.into())], &Recipe::default()).unwrap();
-    // Numbers of that size are 2.4e-7 apart, but digits are not.
+    // Doubles of that size are 2.4e-7 apart, but digits are exact.
     assert_eq!(imported.trace.time_s, since);
-    // A spreadsheet's days are not taken for seconds.
+    // A spreadsheet's days are not interpreted as seconds.
     let text = file("Time,R_ohm,strain_pct\n", |ms, ohm, strain| {
         format!("{:.10},{}", 45_425.0 + ms as f64 / 86_400e3, rest(ohm, strain))
     });
@@ -83,12 +83,12 @@ fn clocks_of_spreadsheets_scanners_and_computers() {
     assert!((span - since.last().unwrap()).abs() < 9e-6, "{span}");
 }
 
-/// Times since the first, s.
+/// Returns times since the first, s.
 fn since_first() -> Vec<f64> {
     truth().time_ms.iter().map(|ms| (ms - truth().time_ms[0]) as f64 / 1e3).collect()
 }
 
-/// A file whose rows begin with a moment, as proposed.
+/// Checks the import, as proposed, of a file whose rows begin with a moment.
 #[track_caller]
 fn has_times(name: &str, names: &str, moment: impl Fn(i64) -> String) {
     let text =
@@ -147,7 +147,7 @@ fn times_since_1970_are_known_by_their_size() {
             if unit < 1.0 { decimal(ms, 3, '.') } else { (ms * unit as i64).to_string() }
         };
         has_times(name, "timestamp,R_ohm,strain_pct\n", count);
-        // Without a header it is the only column that is known.
+        // Without a header it is the only identifiable column.
         let text = file("", |ms, ohm, _| format!("{},{}", count(ms), decimal(ohm, 1, '.')));
         asks(&[(name, &text)], &Recipe::default(), &["(1 is the time); say --column resistance=N"]);
     }

@@ -10,7 +10,7 @@ use ohmstrain_bench_data::import::{Plan, Recipe};
 
 const ROW: &str = "Time (s),R,Strain (%)\n";
 
-/// Resistances as `ohm` writes tenths of an ohm.
+/// Returns a file of resistances, with tenths of an ohm written by `ohm`.
 fn with_ohms(above: &str, ohm: impl Fn(i64) -> String) -> String {
     file(above, |ms, tenths, strain| format!("{},{},{}", decimal(ms, 3, '.'), ohm(tenths), decimal(strain, 2, '.')))
 }
@@ -24,7 +24,7 @@ fn ohms_with_a_prefix_are_ohms() {
         is_imported("prefix.csv", with_ohms(above, |tenths| kilo(tenths, suffix)), &nothing);
     }
     is_imported("mega.csv", with_ohms(ROW, |tenths| decimal(tenths, 7, '.') + "M"), &nothing);
-    // An instrument that chooses its range itself.
+    // An instrument with automatic ranges.
     let ranged = |tenths: i64| if tenths > 16_200 { kilo(tenths, " kOhm") } else { decimal(tenths, 1, '.') + " Ohm" };
     is_imported("ranges.csv", with_ohms(ROW, ranged), &nothing);
     let bare = with_ohms(ROW, |tenths| if tenths > 16_200 { kilo(tenths, "k") } else { decimal(tenths, 1, '.') });
@@ -35,7 +35,7 @@ fn ohms_with_a_prefix_are_ohms() {
         format!("{};{}k;{}", decimal(ms, 3, ','), decimal(tenths, 4, ','), decimal(strain, 2, ','))
     };
     is_imported("komma.csv", file("Zeit (s);Widerstand;Dehnung (%)\n", comma), &nothing);
-    // Names of columns, and lengths, are no ohms.
+    // Names of columns, and lengths, are not ohms.
     is_imported("names.csv", with_ohms(ROW, |tenths| decimal(tenths, 1, '.')).replace(",R,", ",10k,"), &{
         Recipe { columns: vec![("resistance".parse().unwrap(), "10k".parse().unwrap())], ..Recipe::default() }
     });
@@ -65,7 +65,7 @@ fn a_reference_in_volts_is_asked_for_its_scale() {
     let column = vec![("displacement".parse().unwrap(), "Position (V)".parse().unwrap())];
     let known = Recipe { columns: column.clone(), gauge_length_mm: Some(100.0), ..nothing };
     asks(&[("a.csv", &volts)], &known, &["the unit `V` is none of displacement", "--unit displacement=4mm/V"]);
-    // 1 mm per V on 100 mm: the volts are percent, as `truth` has them.
+    // At 1 mm per V on 100 mm the volts are percent, as in `truth`.
     let scaled = Recipe { units: vec![("displacement".parse().unwrap(), "1mm/V".to_owned())], ..known };
     let (recipe, imported) = proposed(&[("a.csv", volts.into())], &scaled).unwrap();
     assert!(recipe.arguments().contains(&"displacement=1mm/V".to_owned()), "{:?}", recipe.arguments());
@@ -74,7 +74,7 @@ fn a_reference_in_volts_is_asked_for_its_scale() {
     }
 }
 
-/// A row: milliohms, and tenths of a millivolt.
+/// Generates rows: milliohms, and tenths of a millivolt.
 fn rows() -> impl Strategy<Value = Vec<(i64, i64)>> {
     proptest::collection::vec((200_000_i64..3_000_000_000, -50_000_i64..50_000), 12..40)
 }
@@ -82,7 +82,7 @@ fn rows() -> impl Strategy<Value = Vec<(i64, i64)>> {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(128) })]
 
-    /// Whatever is suggested of such files is accepted, and has their numbers.
+    /// Every suggestion for such files is accepted, and gives their numbers.
     #[test]
     fn what_is_suggested_of_prefixes_and_volts_is_accepted_and_right(
         rows in rows(),
@@ -135,7 +135,7 @@ fn a_conductance_is_one_over_a_resistance() {
         let text = with_ohms(&names, |tenths| siemens(tenths, per_siemens).to_string());
         let (_, imported) =
             proposed(&[("g.csv", text.into())], &Recipe::default()).unwrap_or_else(|error| panic!("{name}: {error}"));
-        // The quotient, the file's digits and the inverse are rounded once each.
+        // The quotient, the file's digits and the inverse have one rounding each.
         let is_near = |(found, expected): (&f64, f64)| (found / expected - 1.0).abs() < 3.0 * f64::EPSILON;
         assert!(imported.trace.readings.values.iter().zip(truth().ohm()).all(is_near), "{name}");
     }
@@ -158,7 +158,7 @@ fn stretch_ratios_and_relative_changes() {
     let recipe = proposed(&[("lambda.csv", text.clone().into())], &Recipe::default()).unwrap();
     assert!(recipe.0.arguments().windows(2).any(|flag| flag == ["--zero", "strain=1"]), "{:?}", recipe.0.arguments());
     let strain = recipe.1.trace.reference.unwrap().values;
-    // What 1 has more of digits is lost.
+    // Digits below the precision of 1 are lost.
     assert!(strain.iter().zip(truth().strain()).all(|(found, expected)| (found - expected).abs() <= f64::EPSILON));
     let asked = Plan::new(&tables(&[("lambda.csv", text.into())], &Recipe::default()).unwrap(), &Recipe::default());
     assert!(asked.unwrap_err().to_string().contains("--zero strain=1"));

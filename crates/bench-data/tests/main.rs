@@ -1,4 +1,4 @@
-//! Recordings read, written, simulated and imported. One test program; a module for each subject.
+//! Recordings read, written, simulated and imported. One test program with a module for each subject.
 
 mod common;
 

@@ -1,4 +1,4 @@
-//! Traces in Parquet as other programs write them: the root of the schema by any name, any compression, any number type.
+//! Traces in Parquet as other programs write them: any name of the schema's root, any compression, any number type.
 
 use std::fs::{self, File};
 use std::path::Path;
@@ -13,7 +13,7 @@ use parquet::schema::parser::parse_message_type;
 
 const ROWS: usize = 40;
 
-/// Times in whole seconds, ohms in single precision, every seventh of them missing, strain, and a column of something else.
+/// Returns times in whole seconds, ohms in single precision, every seventh of them missing, strain, and an unrelated column.
 fn parquet(root: &str, compression: Compression) -> Vec<u8> {
     let schema = format!(
         "message {root} {{ OPTIONAL INT32 time_s; OPTIONAL FLOAT resistance_ohm; REQUIRED DOUBLE strain; OPTIONAL INT32 note; }}"
@@ -74,7 +74,7 @@ fn a_trace_is_read_whatever_wrote_it() {
         assert_eq!(trace.len(), ROWS, "{root}");
         for row in 0..ROWS {
             assert_eq!(trace.time_s[row], row as f64, "{root}");
-            // By its own digits: 700.1 in single precision is meant to be 700.1.
+            // Single precision is read by its own shortest decimal digits: 700.1 means 700.1.
             let expected = if is_known(row) { ohm(row).to_string().parse().unwrap() } else { f64::NAN };
             assert_eq!(trace.readings.values[row].to_bits(), f64::to_bits(expected), "{root}");
             assert_eq!(trace.reference.as_ref().unwrap().values[row], strain(row), "{root}");

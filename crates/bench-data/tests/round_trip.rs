@@ -8,7 +8,7 @@ use proptest::collection::vec;
 use proptest::option;
 use proptest::prelude::*;
 
-/// A value or, now and then, a missing one.
+/// Returns a value, occasionally a missing one.
 fn maybe_missing(value: impl Strategy<Value = f64>) -> impl Strategy<Value = f64> {
     option::weighted(0.8, value).prop_map(|value| value.unwrap_or(f64::NAN))
 }
@@ -97,7 +97,7 @@ fn trace() -> impl Strategy<Value = Trace> {
             _ => plain(ReadingKind::Ohm),
         };
         if quantity == 1 {
-            // With a joint an angle is read as strain.
+            // With a joint an angle would be read as strain.
             metadata.joint = None;
         }
         let reference =
@@ -118,7 +118,7 @@ fn trace() -> impl Strategy<Value = Trace> {
     })
 }
 
-/// Equality in which a missing value equals a missing value, bit by bit otherwise.
+/// True if traces are equal bit by bit, where a missing value equals a missing value.
 fn same(a: &Trace, b: &Trace) -> bool {
     // `Debug` prints the shortest digits that identify a number, and `NaN` for every NaN.
     format!("{a:?}") == format!("{b:?}")

@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// Rest, stretch, hold, release, rest: corners at 10, 20, 80, 84 and 120 s.
+/// Returns the strain of rest, stretch, hold, release, rest: corners at 10, 20, 80, 84 and 120 s.
 fn trapezoid(time_s: f64) -> f64 {
     0.3 * ((time_s - 10.0) / 10.0).clamp(0.0, 1.0) * ((84.0 - time_s) / 4.0).clamp(0.0, 1.0)
 }
@@ -20,7 +20,7 @@ fn phases(segments: &[Segment]) -> Vec<Phase> {
     segments.iter().map(|segment| segment.phase).collect()
 }
 
-/// The trapezoid's phases, and corners no further than `tolerance_s` from where they are.
+/// Checks for the trapezoid's phases, with corners within `tolerance_s` of their true times.
 fn assert_trapezoid(time_s: &[f64], strain: &[f64], tolerance_s: f64) {
     let segments = segment(time_s, strain);
     assert_eq!(phases(&segments), [Hold, Extend, Hold, Retract, Hold]);
@@ -35,7 +35,7 @@ fn a_clean_trapezoid_has_five_phases_at_any_rate() {
     for rate_hz in [2.0, 10.0, 100.0] {
         let time_s = times(rate_hz, 120.0);
         let strain: Vec<f64> = time_s.iter().map(|t| trapezoid(*t)).collect();
-        // One row to each side is the narrowest window.
+        // The narrowest window has one row to each side.
         assert_trapezoid(&time_s, &strain, 2.0 / rate_hz);
     }
 }

@@ -1,4 +1,4 @@
-//! Seeds, settings, disturbances and what the recordings look like.
+//! Seeds, settings, disturbances and properties of the recordings.
 
 use ohmstrain_bench_data::pacing::{PacedStep, Pacing, Position};
 use ohmstrain_bench_data::simulate::{
@@ -117,7 +117,7 @@ fn the_sensor_does_not_depend_on_the_rate_of_the_recording() {
         let (coarse, fine) = (at(4.0), at(1000.0));
         for i in 0..coarse.len() {
             let difference = coarse.readings.values[i] - fine.readings.values[250 * i];
-            // Two roundings to 1 mΩ, and gains at mid-strain over 10 ms steps: 1e-6 of R.
+            // Two roundings to 1 mΩ, and gains at mid-strain over 10 ms steps, which add 1e-6 of R.
             assert!(difference.abs() < 4e-3, "{i} {difference}");
         }
     }
@@ -159,7 +159,7 @@ fn a_front_end_quantises_and_saturates() {
     let converter = trace.readings.converter.unwrap();
     for i in 0..exact.len() {
         let error = (trace.readings.values[i] - exact.readings.values[i]) / converter.sd_ohm[i];
-        // Rounding is wrong by half a code at most, √3 of its standard deviation, and the divider bends by 0.1 %.
+        // The rounding error is at most half a code, √3 of its standard deviation; the divider's nonlinearity is 0.1 %.
         assert!(error.abs() < 1.75, "{error}");
     }
     let narrow = spec("constant-current current_a=1e-4 gain=10 full_scale_v=2.0 bits=12 noise_codes=0.5");
@@ -210,7 +210,7 @@ fn names_are_read_back() {
     assert!("latex".parse::<Material>().is_err() && "wiggle".parse::<Protocol>().is_err());
 }
 
-/// Rest, to a position in 2 s and hold for 8 s, eight times to and fro.
+/// Returns settings with a rest, then eight moves to and fro: to a position in 2 s and a hold for 8 s.
 fn followed(values: [f64; 2], quantity: ReferenceQuantity, person: Person) -> SimulationSettings {
     let position = |value: f64| Position { name: value.to_string(), values: vec![value], sd: 0.01 };
     let mut steps = vec![PacedStep { to: 0, move_s: 0.0, hold_s: 10.0 }];
@@ -220,7 +220,7 @@ fn followed(values: [f64; 2], quantity: ReferenceQuantity, person: Person) -> Si
     SimulationSettings { followed, ..settings(SHORT_HOLD) }
 }
 
-/// Strain in the middle of each hold but the first.
+/// Returns the strain in the middle of each hold but the first.
 fn held(trace: &Trace) -> Vec<f64> {
     (0..16).map(|k| strain(trace)[20 * (10 + 10 * k + 6)]).collect()
 }
@@ -232,13 +232,13 @@ fn a_person_follows_a_protocol_late_and_reaches_its_positions() {
     assert_eq!(trace.time_s.last(), Some(&170.0));
     let positions: Vec<f64> = (0..16).map(|k| if k % 2 == 0 { 0.2 } else { 0.0 }).collect();
     assert_eq!(held(&trace), positions);
-    // A cue is at a multiple of ten seconds; nobody acts on it sooner than in 0.15 s, and everybody has moved in 2 s.
+    // Cues are at multiples of ten seconds; nobody reacts within 0.15 s, and everybody has moved within 2 s.
     for cue in 1..17 {
         let at = |seconds: f64| strain(&trace)[(20.0 * (10.0 * f64::from(cue) + seconds)) as usize];
         assert_eq!(at(0.1), at(-0.5));
         assert!((at(2.0) - at(0.1)).abs() > 0.05, "{cue}");
     }
-    // Angles bend the sensor to its full stretch, and are the reference.
+    // Angles stretch the sensor up to its full stretch, and are the reference.
     let angles = simulate(&followed([0.0, 90.0], ReferenceQuantity::AngleDeg, exact)).unwrap();
     assert_eq!(angles.reference.as_ref().unwrap().quantity, ReferenceQuantity::AngleDeg);
     assert_eq!(held(&angles)[0], 90.0);
@@ -254,8 +254,8 @@ fn a_person_errs_as_much_as_is_said() {
         let errors = held(&trace).into_iter().enumerate().map(|(k, x)| x - if k % 2 == 0 { 0.3 } else { 0.1 });
         squares.extend(errors.map(|error| error * error));
     }
-    // 0.05 of a span of 0.2. Half of the variance is the same in a recording's visits of a position: of 120 draws a variance is known to
-    // 13 %, so that three deviations are a fifth of the standard deviation.
+    // 0.05 of a span of 0.2. Half of the variance is the same at all visits of a position within a recording. The variance of 120 draws is
+    // known to 13 %, so three deviations are a fifth of the standard deviation.
     let sd = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
     assert!((sd / 0.01 - 1.0).abs() < 0.2, "{sd}");
     let missing = Person { mark_sd: 0.0, missed: 0.3, cut_short: 0.0 };

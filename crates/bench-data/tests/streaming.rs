@@ -6,7 +6,7 @@ use std::rc::Rc;
 
 use ohmstrain_bench_data::TraceReader;
 
-/// Gives one line per call of `read` and counts them.
+/// Reader that returns one line per call of `read` and counts them.
 struct Lines {
     lines: Vec<&'static str>,
     given: Rc<Cell<usize>>,
@@ -40,7 +40,7 @@ fn a_live_pipe_is_answered_row_by_row() {
     let (reader, mut writer) = std::io::pipe().unwrap();
     writer.write_all(b"time_s,resistance_ohm\n").unwrap();
     let mut rows = TraceReader::new(reader, "-").unwrap();
-    // Written and read in turn in one thread: a reader that waited for more would never return.
+    // Written and read alternately in one thread: a reader that waited for more input would never return.
     for i in 0..100 {
         write!(writer, "{i},{}", i + 1).unwrap();
         writer.write_all(b"\n").unwrap();

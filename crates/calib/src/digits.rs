@@ -1,12 +1,13 @@
-/// Significant digits of the rows that a correction keeps. The fit sees the same numbers as the reader of a file.
+/// Significant digits of the rows that a correction stores. The fit uses the rounded numbers, as a reader of the file
+/// does.
 const DIGITS: usize = 6;
 
-/// A number with so many significant digits, one or more.
+/// Rounds a number to `digits` significant digits, at least one.
 pub(crate) fn significant(value: f64, digits: usize) -> f64 {
     format!("{value:.*e}", digits.saturating_sub(1)).parse().unwrap_or(value)
 }
 
-/// A number as it is kept.
+/// Rounds a number to the digits that are stored.
 pub(crate) fn digits(value: f64) -> f64 {
     significant(value, DIGITS)
 }

@@ -1,9 +1,9 @@
-//! Least content of recordings that are calibrated on.
+//! Minimum requirements for recordings of a calibration.
 
 use crate::samples::FEWEST_ROWS;
 use crate::{CalibrationError, Samples};
 
-/// Checks what calibration relies on and returns the strain's range over all recordings.
+/// Checks the requirements of a calibration and returns the strain's range over all recordings.
 pub(crate) fn check(recordings: &[Samples]) -> Result<(f64, f64), CalibrationError> {
     let mut range: Option<(f64, f64)> = None;
     for (recording, samples) in recordings.iter().enumerate() {

@@ -5,7 +5,7 @@ use ohmstrain_model::ParameterError;
 use ohmstrain_sensor::SensorError;
 use thiserror::Error;
 
-/// Reason for making no calibration.
+/// Reason why a calibration failed.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum CalibrationError {
@@ -31,10 +31,10 @@ pub enum CalibrationError {
         /// Rows needed.
         needed: usize,
     },
-    /// Slices that are no recording.
+    /// Slices that do not form a recording.
     #[error(transparent)]
     Samples(#[from] SamplesError),
-    /// Marks that give no reference.
+    /// Marks that do not give a reference.
     #[error("{}{source}", source.mark().map_or(String::new(), |mark| format!("mark {}: ", mark + 1)))]
     Marks {
         /// Index of the recording.
@@ -55,13 +55,13 @@ pub enum CalibrationError {
         100.0 * unexplained
     )]
     NothingExplained {
-        /// Squared error of the law over that of a constant, on blocks left out.
+        /// Squared error of the law over that of a constant, on held-out blocks.
         unexplained: f64,
     },
     /// The least-squares problem has no unique solution.
     #[error("the law cannot be fitted: its equations are singular")]
     Singular,
-    /// The resistance at zero strain comes out at zero or below.
+    /// The fitted resistance at zero strain is not positive.
     #[error("the reading at zero strain comes out as {value:.4} of the median reading; record nearer to zero strain")]
     RestResistance {
         /// Rest resistance over the median reading.
@@ -75,7 +75,7 @@ pub enum CalibrationError {
     Filter {
         /// Time of the failing row, s.
         time_s: f64,
-        /// Its message.
+        /// Error of the filter.
         source: StepError,
     },
     /// The optimiser failed.
@@ -84,7 +84,7 @@ pub enum CalibrationError {
     /// No filter can be made of the parameters.
     #[error(transparent)]
     Sensor(#[from] SensorError),
-    /// A request that this version has no form for.
+    /// A request that this version does not support.
     #[error("{0}")]
     Unsupported(String),
 }

@@ -1,4 +1,4 @@
-//! The correction as files of format 8 have it: what it was learned from, without weights.
+//! The correction in files of format 8: the rows that it was learned from, without weights.
 
 use ohmstrain_sensor::{CorrectionParams, CorrectionScale, EstimatorKind, RangeParams, TrainingRow};
 use serde::Deserialize;
@@ -63,7 +63,7 @@ impl Corrector {
             settings: Settings { lengths, noise, noise_time_s },
             sd_scale,
         };
-        // That of the future saw the reading, too.
+        // The process of the future used the reading, too.
         let future = std::iter::once(OUTPUTS).chain(OUTPUTS + FEATURES..inputs).collect();
         let one_sided = self.one_sided.into_iter().zip([ProcessKind::Past.places(inputs), future]);
         Choices {

@@ -1,12 +1,12 @@
-//! Calibration of soft strain sensors: from bench recordings with known strain to the parameters a filter needs.
+//! Calibration of soft strain sensors: from bench recordings with known strain to the parameters of a filter.
 //!
-//! [`calibrate`] fits a law per strength of ridge, and to each of them noise and motion so that the filter's own posterior
-//! is right on the known strain; the law with which the filter does best is taken. [`fit_law`] fits a law by itself.
-//! [`SensorParams`](ohmstrain_sensor::SensorParams) is what is written down, and what a filter runs from.
+//! [`calibrate`] fits a law per strength of ridge, and noise and motion to each of them such that the filter's posterior fits the known
+//! strain. The law with the best filter is chosen. [`fit_law`] fits a law by itself. [`SensorParams`](ohmstrain_sensor::SensorParams) is
+//! the stored result, from which a filter runs.
 //!
 //! # Policy
-//! - Knows samples ([`Samples`]), not files.
-//! - Deterministic: the same samples give the same parameters. Nothing is random, no clock is read.
+//! - Works on samples ([`Samples`]), not on files.
+//! - Deterministic: the same samples give the same parameters. Random numbers have fixed seeds, no clock is read.
 //! - A calibration that cannot be made is a [`CalibrationError`]; nothing panics on recorded data.
 
 #[cfg(doctest)]

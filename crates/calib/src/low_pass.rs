@@ -1,6 +1,6 @@
 use ohmstrain_ekf::correction;
 
-/// A low-pass over readings whose times are known.
+/// A low-pass over readings with known times.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LowPass {
     low_pass: correction::LowPass<f64>,
@@ -16,7 +16,7 @@ impl LowPass {
         self.low_pass.tau_s()
     }
 
-    /// Takes a reading and returns the low-pass at its time.
+    /// Adds a reading and returns the low-pass at its time.
     pub(crate) fn next(&mut self, time_s: f64, reading: f64) -> f64 {
         let dt_s = time_s - self.last_s.unwrap_or(time_s);
         self.last_s = Some(time_s);

@@ -8,28 +8,27 @@ pub(crate) struct MotionStats {
     pub strain_mean: f64,
     pub strain_sd: f64,
     pub rate_sd: f64,
-    /// Time after which the rate's autocorrelation has fallen to 1/e.
+    /// Time at which the rate's autocorrelation has fallen to 1/e, s.
     pub rate_time_s: f64,
-    /// Mean durations of holds and of movements in one direction; `None` for a body that does not rest ([`PhaseDurations::rests`]).
+    /// Mean durations, s, of holds (`None` for a body that does not rest, [`PhaseDurations::rests`]) and of movements in one direction.
     pub hold_s: Option<f64>,
     pub move_s: f64,
-    /// Share of movements that another one follows without a hold.
+    /// Fraction of movements that are followed by another one without a hold.
     pub reversal: f64,
     /// Median speed of movements.
     pub speed: f64,
-    /// Speeds that a quarter of the moving rows is below, and above.
+    /// Lower and upper quartile of the speed in moving rows.
     pub quartile_speeds: (f64, f64),
     /// Longest hold, s; zero for a body that never rests.
     pub longest_hold_s: f64,
     /// 99th percentile of the speed.
     pub fastest_rate: f64,
     pub longest_s: f64,
-    /// Distances of all movements that stretch, and of all that release.
+    /// Total distances of all stretching and of all releasing movements.
     pub distances: [f64; 2],
 }
 
-/// Rows over which a rate is averaged, to each side: references are quantised and a difference of neighbours shows that
-/// before anything else.
+/// Rows to each side over which a rate is averaged: references are quantised, which dominates the difference of neighbours.
 const HALF_WINDOW: usize = 2;
 
 impl MotionStats {
@@ -68,8 +67,8 @@ impl MotionStats {
     }
 }
 
-/// Below this share of its time at rest a body does not rest, it turns around: a sine's rate is below [`REST_SHARE`] of
-/// its fast ones for (2/π) asin(0.05 · sin 81°) = 3 % of the time. Three times that.
+/// Fraction of time at rest below which a body only turns around: a sine's rate is below [`REST_SHARE`] of its fast ones for (2/π)
+/// asin(0.05 · sin 81°) = 3 % of the time. Three times that.
 const LEAST_REST: f64 = 0.1;
 
 /// Durations of holds and movements.
@@ -82,9 +81,9 @@ struct PhaseDurations {
     distances: [f64; 2],
 }
 
-/// Below this share of the fast rates (90th percentile) a body is at rest.
+/// Fraction of the fast rates (90th percentile) below which a body is at rest.
 pub(crate) const REST_SHARE: f64 = 0.05;
-/// A phase of fewer rows is a flicker.
+/// Minimum number of rows of a phase; shorter ones are flicker.
 const FEWEST_PHASE_ROWS: usize = 2;
 
 impl PhaseDurations {
@@ -111,7 +110,7 @@ impl PhaseDurations {
         self.speeds.extend(rate.iter().filter(|v| phase(**v) != 0).map(|v| v.abs()));
     }
 
-    /// True if the body rests, and not only for the moment in which it turns around.
+    /// True if the body rests for longer than the moments in which it turns around.
     fn rests(&self) -> bool {
         let (at_rest, moving): (f64, f64) = (self.holds.iter().sum(), self.moves.iter().sum());
         !self.holds.is_empty() && at_rest >= LEAST_REST * (at_rest + moving)
@@ -122,14 +121,14 @@ impl PhaseDurations {
         (1.0 - self.holds.len() as f64 / self.moves.len().max(1) as f64).clamp(0.05, 0.95)
     }
 
-    /// The speed that `share / of` of the moving rows are below.
+    /// Returns the quantile `share / of` of the speed in moving rows.
     fn speed_at(&self, share: usize, of: usize) -> f64 {
         let speeds = sorted(self.speeds.iter().copied());
         speeds.get(speeds.len() * share / of).copied().unwrap_or(0.0)
     }
 }
 
-/// Time at which the autocorrelation crosses 1/e, at most half the recording.
+/// Returns the time at which the autocorrelation crosses 1/e, s, at most half the recording.
 fn correlation_time(time_s: &[f64], x: &[f64]) -> f64 {
     let rows = x.len();
     let interval = (time_s[rows - 1] - time_s[0]) / (rows - 1) as f64;
@@ -163,14 +162,14 @@ mod tests {
         MotionStats::new(&[Samples::new(&time_s, &reading, &strain).unwrap()]).hold_s
     }
 
-    /// Tests a sine: it is slow for 3 % of the time at its turns, which is no hold.
+    /// Tests a sine: it is slow for 3 % of the time around its turns, which is not a hold.
     #[test]
     fn a_body_that_turns_around_does_not_rest() {
         assert_eq!(hold_s(|t| 0.15 * (1.0 - (std::f64::consts::TAU * t / 30.0).cos())), None);
     }
 
-    /// Tests a strain that rises in 5 s, is held for 10, falls in 5 and is held for 10. Averages over five rows round off the corners by
-    /// half their width.
+    /// Tests a strain that rises in 5 s, is held for 10 s, falls in 5 s and is held for 10 s. Averages over five rows round off the corners
+    /// by half their width.
     #[test]
     fn holds_between_movements_are_rest() {
         let ramps = |t: f64| 0.3 * ((t % 30.0) / 5.0).min(1.0).min((20.0 - t % 30.0) / 5.0).max(0.0);

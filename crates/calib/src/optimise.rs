@@ -2,18 +2,18 @@
 //!
 //! Source: J. A. Nelder, R. Mead, A simplex method for function minimization, *The Computer Journal* 7 (1965) 308–313.
 
-/// Stands for a cost that cannot be computed.
+/// Cost that replaces one that is not finite.
 const VERY_BAD: f64 = 1e9;
-/// The search ends where the costs of the corners have a smaller standard deviation.
+/// Standard deviation of the corners' costs below which the search ends.
 const SETTLED: f64 = 1e-7;
-/// Factors by which a corner is moved, from the centroid of the others.
+/// Factors on offsets from the centroid of the other corners or, for shrinkage, from the best corner.
 const REFLECTION: f64 = -1.0;
 const EXPANSION: f64 = 2.0;
 const CONTRACTION: f64 = 0.5;
 const SHRINKAGE: f64 = 0.5;
 
-/// The best point that Nelder-Mead finds from `start` with a first simplex of side `step` in every direction, in at most
-/// `iterations` iterations. A cost that is not finite counts as very bad.
+/// Returns the best point that Nelder-Mead finds from `start`, with a first simplex of side `step` in every direction,
+/// in at most `iterations` iterations. A cost that is not finite counts as very bad.
 pub(crate) fn nelder_mead(mut cost: impl FnMut(&[f64]) -> f64, start: &[f64], step: f64, iterations: u64) -> Vec<f64> {
     let mut corner = |point: Vec<f64>| {
         let cost = cost(&point);
@@ -50,17 +50,17 @@ struct Corner {
     cost: f64,
 }
 
-/// Best corner first; ties keep their order.
+/// Sorts corners by cost, best first; ties keep their order.
 fn sort(simplex: &mut [Corner]) {
     simplex.sort_by(|a, b| a.cost.total_cmp(&b.cost));
 }
 
-/// `factor` times the way from `origin` to `point`.
+/// Returns the point at `factor` times the offset of `point` from `origin`.
 fn from(origin: &[f64], point: &[f64], factor: f64) -> Vec<f64> {
     origin.iter().zip(point).map(|(origin, point)| origin + (point - origin) * factor).collect()
 }
 
-/// The corner that takes the place of the worst one; `None` where the simplex has to shrink.
+/// Returns the corner that replaces the worst one; `None` if the simplex has to shrink.
 fn improved(simplex: &[Corner], mut corner: impl FnMut(Vec<f64>) -> Corner) -> Option<Corner> {
     let [best, .., worst] = simplex else { return None };
     let second_worst = &simplex[simplex.len() - 2];
@@ -90,7 +90,7 @@ fn centroid(corners: &[Corner]) -> Vec<f64> {
     sum.into_iter().map(|sum| sum * share).collect()
 }
 
-/// Standard deviation of the costs.
+/// Returns the standard deviation of the costs.
 fn spread(simplex: &[Corner]) -> f64 {
     let n = simplex.len() as f64;
     let mean = simplex.iter().map(|corner| corner.cost).sum::<f64>() / n;
@@ -107,7 +107,8 @@ mod tests {
     fn the_minimum_of_rosenbrocks_function_is_found() {
         let cost = |x: &[f64]| (1.0 - x[0]).powi(2) + 100.0 * (x[1] - x[0] * x[0]).powi(2);
         let best = nelder_mead(cost, &[-1.2, 1.0], 0.5, 500);
-        // Costs that differ by 1e-7 are points apart by its root over that of the least curvature, about 0.4.
+        // Costs that differ by 1e-7 belong to points whose distance is the root of that over the root of the smallest
+        // curvature, about 0.4.
         assert!(best.iter().all(|x| (x - 1.0).abs() < 1e-3), "{best:?}");
     }
 

@@ -5,13 +5,13 @@ pub(crate) fn sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
     sorted
 }
 
-/// The middle one of known values, the upper one of two; `None` without any.
+/// Returns the median of known values, the upper of two middle ones; `None` if there are none.
 pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let sorted = sorted(values);
     sorted.get(sorted.len() / 2).copied()
 }
 
-/// The least and the largest of known values; without any the least is the larger one.
+/// Returns the smallest and the largest of known values; without any the first is larger than the second.
 pub(crate) fn extent(values: impl Iterator<Item = f64>) -> (f64, f64) {
     values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
 }

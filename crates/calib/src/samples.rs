@@ -17,7 +17,7 @@ pub struct Samples<'a> {
     pub(crate) strain_sd: &'a [f64],
 }
 
-/// Reason why slices are no recording. Rows count from zero.
+/// Reason why slices do not form a recording. Rows count from zero.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SamplesError {
@@ -39,14 +39,14 @@ pub enum SamplesError {
         /// Its time, s.
         time_s: f64,
     },
-    /// A time is not after the one before.
+    /// A time is not after the previous one.
     #[error("row {row}: expected a time after {before_s} s, found {time_s} s")]
     Order {
         /// The row.
         row: usize,
         /// Its time, s.
         time_s: f64,
-        /// The time before, s.
+        /// Previous time, s.
         before_s: f64,
     },
     /// A reading is infinite, zero or negative.
@@ -76,11 +76,11 @@ pub enum SamplesError {
 }
 
 impl<'a> Samples<'a> {
-    /// Times, s, that increase; positive readings, Ω or ratios; and true strains. NaN stands for a missing reading or
+    /// Makes a recording of increasing times, s, positive readings, Ω or ratios, and true strains. NaN stands for a missing reading or
     /// strain.
     ///
     /// # Errors
-    /// The first row that is not as it must be, or lengths that differ.
+    /// If the slices differ in length, or with the first invalid row.
     pub fn new(time_s: &'a [f64], reading: &'a [f64], strain: &'a [f64]) -> Result<Self, SamplesError> {
         if reading.len() != time_s.len() || strain.len() != time_s.len() {
             let (times, readings, strains) = (time_s.len(), reading.len(), strain.len());
@@ -105,8 +105,8 @@ impl<'a> Samples<'a> {
         Ok(Self { time_s, reading, strain, strain_sd: &[] })
     }
 
-    /// The same with standard deviations of the true strains: errors of an estimate count with them, so that intervals cover the
-    /// reference's error as well.
+    /// Adds standard deviations of the true strains. Errors of an estimate are increased by them, so that intervals cover the reference's
+    /// error as well.
     ///
     /// # Errors
     /// [`SamplesError::StrainSd`] for the first known strain whose standard deviation is not zero or positive, and
@@ -123,30 +123,30 @@ impl<'a> Samples<'a> {
         }
     }
 
-    /// Standard deviation of the true strain in a row; zero where it is exact.
+    /// Returns the standard deviation of the true strain in a row; zero if it is exact.
     pub(crate) fn sd_of_strain(&self, row: usize) -> f64 {
         self.strain_sd.get(row).copied().filter(|sd| sd.is_finite()).unwrap_or(0.0)
     }
 
-    /// Times, s.
+    /// Returns the times, s.
     #[must_use]
     pub const fn time_s(&self) -> &'a [f64] {
         self.time_s
     }
 
-    /// Readings; NaN where missing.
+    /// Returns the readings; NaN where missing.
     #[must_use]
     pub const fn reading(&self) -> &'a [f64] {
         self.reading
     }
 
-    /// True strains; NaN where missing.
+    /// Returns the true strains; NaN where missing.
     #[must_use]
     pub const fn strain(&self) -> &'a [f64] {
         self.strain
     }
 
-    /// The first `rows` rows.
+    /// Returns the first `rows` rows.
     #[must_use]
     pub fn head(&self, rows: usize) -> Self {
         let rows = rows.min(self.time_s.len());
@@ -154,12 +154,12 @@ impl<'a> Samples<'a> {
         Self { time_s: &self.time_s[..rows], reading: &self.reading[..rows], strain: &self.strain[..rows], strain_sd }
     }
 
-    /// Time from the first row to the last, s.
+    /// Returns the time from the first row to the last, s.
     pub(crate) fn duration_s(&self) -> f64 {
         self.time_s.last().zip(self.time_s.first()).map_or(0.0, |(last, first)| last - first)
     }
 
-    /// Number of rows.
+    /// Returns the number of rows.
     #[must_use]
     pub fn len(&self) -> usize {
         self.time_s.len()
@@ -171,13 +171,13 @@ impl<'a> Samples<'a> {
         self.time_s.is_empty()
     }
 
-    /// Rows in which both reading and strain are known.
+    /// Returns the rows in which both reading and strain are known.
     pub fn complete_rows(&self) -> impl Iterator<Item = usize> + use<'a> {
         let (reading, strain) = (self.reading, self.strain);
         (0..self.time_s.len()).filter(move |&k| reading[k].is_finite() && strain[k].is_finite())
     }
 
-    /// Smallest and largest known strain; `None` if nothing is known.
+    /// Returns the smallest and the largest known strain; `None` if no strain is known.
     #[must_use]
     pub fn strain_range(&self) -> Option<(f64, f64)> {
         let known = self.strain.iter().copied().filter(|x| x.is_finite());
@@ -185,10 +185,10 @@ impl<'a> Samples<'a> {
     }
 }
 
-/// Fewest complete rows a recording needs to be calibrated on: several per parameter of the smallest law.
+/// Least number of complete rows in a recording for calibration: several per parameter of the smallest law.
 pub(crate) const FEWEST_ROWS: usize = 60;
 
-/// The known strain without gaps: missing values interpolated in time, the ends held.
+/// Returns the strain without gaps: missing values are interpolated in time, and the ends held.
 #[must_use]
 pub(crate) fn filled_strain(samples: &Samples) -> Vec<f64> {
     let known: Vec<usize> = (0..samples.len()).filter(|&k| samples.strain[k].is_finite()).collect();
@@ -206,20 +206,20 @@ pub(crate) fn filled_strain(samples: &Samples) -> Vec<f64> {
     filled
 }
 
-/// The usual time between rows, s: the median of recordings' steps.
+/// Returns the usual time between rows, s: the median step over all recordings.
 pub(crate) fn usual_step_s<'a>(recordings: impl Iterator<Item = &'a [f64]>) -> f64 {
     let mut steps: Vec<f64> = recordings.flat_map(|time_s| time_s.windows(2).map(|pair| pair[1] - pair[0])).collect();
     let middle = steps.len() / 2;
     if steps.is_empty() { 0.0 } else { *steps.select_nth_unstable_by(middle, f64::total_cmp).1 }
 }
 
-/// Smallest and largest reading of the rows that were calibrated on.
+/// Returns the smallest and the largest reading of the rows used for calibration.
 pub(crate) fn reading_range(recordings: &[Samples]) -> (f64, f64) {
     let readings = recordings.iter().flat_map(|samples| samples.complete_rows().map(|k| samples.reading[k]));
     extent(readings)
 }
 
-/// Rate by central differences over one row to each side, one-sided at the ends.
+/// Returns the rate by central differences over one row to each side, one-sided at the ends.
 pub(crate) fn central_rate(time_s: &[f64], x: &[f64]) -> Vec<f64> {
     let last = x.len().saturating_sub(1);
     (0..x.len())

@@ -1,4 +1,4 @@
-//! Baselines against naive dense least squares: integrals summed up, designs stacked, every block left out by hand.
+//! Baselines against naive dense least squares: integrals are summed, designs stacked, and every block left out explicitly.
 
 use nalgebra::{DMatrix, DVector};
 use ohmstrain_calib::{Baseline, Baselines, Fir, LeakyBank, LowPassMode, PublishedLaw};
@@ -7,7 +7,7 @@ use ohmstrain_model::Phase;
 use super::bench::Bench;
 
 impl Bench {
-    /// Times and readings that are known up to a row.
+    /// Returns the known times and readings up to a row.
     fn known(&self, row: usize) -> Vec<(f64, f64)> {
         (0..=row).filter(|&k| self.reading[k].is_finite()).map(|k| (self.time_s[k], self.reading[k])).collect()
     }
@@ -17,8 +17,8 @@ impl Bench {
     }
 }
 
-/// A sine with a harmonic, read through a parabola that remembers; steps from `step_s` to twice that, missing readings and a
-/// missing reference.
+/// Returns a recording of a sine with a harmonic, read through a parabola with memory; steps from `step_s` to twice that, with missing
+/// readings and a missing reference.
 fn record(rows: usize, step_s: f64, phase: f64) -> Bench {
     let mut bench = Bench::default();
     let (mut time_s, mut memory) = (3.0, 0.0);
@@ -38,7 +38,7 @@ fn record(rows: usize, step_s: f64, phase: f64) -> Bench {
     bench
 }
 
-/// Readings are scaled to ±1 by the range of the complete rows.
+/// Scales readings to ±1 by the range of the complete rows.
 fn scaled(benches: &[Bench], reading: f64) -> f64 {
     let known: Vec<f64> =
         benches.iter().flat_map(|bench| bench.complete().into_iter().map(|k| bench.reading[k])).collect();
@@ -46,15 +46,14 @@ fn scaled(benches: &[Bench], reading: f64) -> f64 {
     2.0 * (reading - low) / (high - low) - 1.0
 }
 
-/// The convolution of straight lines between known readings with exp(-t/τ)/τ, each line by Simpson's rule.
+/// Returns the convolution of straight lines between known readings with exp(-t/τ)/τ, each line by Simpson's rule.
 fn low_pass(known: &[(f64, f64)], tau_s: f64) -> f64 {
     let (end_s, _) = known[known.len() - 1];
     let kernel = |t: f64| (-(end_s - t) / tau_s).exp() / tau_s;
     let mut value = known[0].1 * (-(end_s - known[0].0) / tau_s).exp();
     for pair in known.windows(2) {
         let ((a_s, a), (b_s, b)) = (pair[0], pair[1]);
-        // Steps are at most 0.8 s, so h/τ is below 0.8/32/0.5 = 0.05 and Simpson's error below 0.05⁴/180 = 4e-8 of the
-        // line's share.
+        // Steps are at most 0.8 s, so h/τ is below 0.8/32/0.5 = 0.05 and Simpson's error below 0.05⁴/180 = 4e-8 of the line's contribution.
         let panels = 32;
         let h = (b_s - a_s) / f64::from(panels);
         for panel in 0..panels {
@@ -68,7 +67,7 @@ fn low_pass(known: &[(f64, f64)], tau_s: f64) -> f64 {
     value
 }
 
-/// Linear interpolation, the first reading before it.
+/// Interpolates linearly; before the first reading it returns that reading.
 fn interpolated(known: &[(f64, f64)], time_s: f64) -> f64 {
     let Some(pair) = known.windows(2).rev().find(|pair| pair[0].0 <= time_s) else { return known[0].1 };
     let ((a_s, a), (b_s, b)) = (pair[0], pair[1]);
@@ -77,7 +76,7 @@ fn interpolated(known: &[(f64, f64)], time_s: f64) -> f64 {
 
 type FeaturesAt<'a> = &'a dyn Fn(&[(f64, f64)]) -> Vec<f64>;
 
-/// Weights that minimise Σ(y - X w)² + ridge rows Σ var w² over all columns but the constant, as one stacked system.
+/// Returns weights that minimise Σ(y - X w)² + ridge rows Σ var w² over all columns but the constant, as one stacked system.
 fn ridge_weights(x: &DMatrix<f64>, y: &DVector<f64>, ridge: f64, variance: &[f64]) -> DVector<f64> {
     let (rows, size) = x.shape();
     let stacked = DMatrix::from_fn(rows + size, size, |k, j| match k.checked_sub(rows) {
@@ -192,7 +191,7 @@ fn the_leaky_bank_is_ridge_regression_on_products_of_convolutions() {
 fn the_fir_is_ridge_regression_on_interpolated_readings() {
     let benches = [record(300, 0.2, 0.0), record(200, 0.4, 1.0)];
     let fitted = Fir::fit(&[benches[0].samples(), benches[1].samples()]).unwrap();
-    // The second recording's steps are 0.4 to 0.8 s, in the middle near 0.6; 20 s are 33 of them.
+    // The second recording's steps are 0.4 to 0.8 s, with a median near 0.6 s; 20 s are 33 of them.
     assert!((0.5..0.7).contains(&fitted.features.spacing_s()));
     assert_eq!(fitted.features.taps(), (20.0 / fitted.features.spacing_s()) as usize);
     let features = |known: &[(f64, f64)]| {
@@ -253,7 +252,7 @@ fn rows_on_a_line_between_rows_change_nothing() {
         strain: vec![],
     };
     let check = |plain: Vec<f64>, between: Vec<f64>| {
-        // The last known row has no line after it. A few hundred roundings of numbers of order one.
+        // The last known row is not followed by a line. A few hundred roundings of numbers of order one.
         let same: Vec<f64> = between.into_iter().step_by(3).collect();
         assert_close(&plain[..same.len()], &same, 1e-12);
     };
@@ -286,7 +285,7 @@ fn what_a_baseline_says_is_held_and_clipped() {
 
 #[test]
 fn a_slow_recording_gets_a_coarse_grid_and_a_fast_one_forty_taps() {
-    // Steps of 3 to 6 s, 4.5 s in the middle: four of them within 20 s.
+    // Steps of 3 to 6 s, with a median of 4.5 s: four of them within 20 s.
     let slow = Fir::fit(&[record(200, 3.0, 0.0).samples()]).unwrap();
     assert_eq!(slow.features.taps(), 4);
     let fast = Fir::fit(&[record(1000, 0.05, 0.0).samples()]).unwrap();
@@ -300,11 +299,11 @@ fn readings_that_do_not_vary_are_an_error() {
     assert!(Baselines::fit(&[bench.samples()]).is_err());
 }
 
-/// Ramps at several speeds with holds between, by equations 8 and 9 as they are printed; the law that is fitted to them
-/// and told when phases begin says the strains.
+/// Ramps at several speeds with holds in between, by equations 8 and 9 as printed. The law that is fitted to them, given the starts of
+/// phases, returns the strains.
 #[test]
 fn the_published_law_says_the_strain_of_its_own_readings() {
-    // Stretches of 4 s and less, releases of 3; time constants that are among those tried.
+    // Stretches of 4 s and less, releases of 3 s; time constants on the grid of the fit.
     let dt_s = 0.25;
     let tau_s = |longest_s: f64, place: i32| longest_s * 0.01 * 3000_f64.powf(f64::from(place) / 79.0);
     let ramps = [(0.05, 4.0), (-0.04, 3.0), (0.02, 2.0), (-0.1, 1.0), (0.08, 1.5), (-0.05, 2.0)];
@@ -334,7 +333,7 @@ fn the_published_law_says_the_strain_of_its_own_readings() {
     }
     let fitted = PublishedLaw::fit(&[bench.samples()], std::slice::from_ref(&phases)).unwrap();
     let starts = phases.iter().map(|(phase, rows)| (bench.time_s[rows.start], *phase)).collect();
-    // Readings of 10³ from which differences of one are taken, six times over.
+    // Differences of one between readings of 10³, accumulated six times.
     assert_close(&run(fitted.start(starts, bench.strain[0]), &bench), &bench.strain, 1e-10);
     assert!(PublishedLaw::fit(&[bench.samples()], &[phases[..2].to_vec()]).is_err(), "there is no release");
 }

@@ -1,4 +1,4 @@
-//! Calibration on sensors whose law is known because the test wrote it down.
+//! Calibration on sensors whose law is written down in the test.
 
 use std::cell::OnceCell;
 use std::f64::consts::TAU;
@@ -14,12 +14,12 @@ use ohmstrain_sensor::{
 
 use super::bench::Bench;
 
-/// A small deterministic noise: the fractional parts of multiples of the golden ratio, roughly uniform in ±1.
+/// Returns a small deterministic noise: the fractional parts of multiples of the golden ratio, roughly uniform in ±1.
 fn jitter(k: usize) -> f64 {
     2.0 * (k as f64 * 0.618_033_988_749_895).fract() - 1.0
 }
 
-/// The switched law written out naively, one explicit Euler step of a millisecond at a time.
+/// Simulates the switched law naively, one explicit Euler step of a millisecond at a time.
 fn record(rest_ohm: f64, phase: f64, noise: f64) -> Bench {
     let strain_at = |t: f64| 0.15 + 0.08 * (TAU * t / 17.0 + phase).sin() + 0.06 * (TAU * t / 7.3).sin();
     let mut bench = Bench::default();
@@ -47,18 +47,18 @@ fn the_law_explains_a_sensor_of_its_own_kind() {
     let bench = record(1500.0, 0.0, 1e-3);
     let fit = fit_law(&[bench.samples()], LawOptions::default()).unwrap();
     let rms = |rows: &[f64]| (rows.iter().map(|r| r * r).sum::<f64>() / rows.len() as f64).sqrt();
-    // The readings span 0.5 R₀. The ridge costs a few per cent of that, on blocks left out a little more.
+    // The readings span 0.5 R₀. The ridge costs a few per cent of that, slightly more on held-out blocks.
     assert!(rms(&fit.law.residuals[0]) < 0.015, "{}", rms(&fit.law.residuals[0]));
     assert!(fit.law.cross_validated_error < 0.02, "{}", fit.law.cross_validated_error);
-    // Nothing was recorded at zero strain for long: the ridge moves R₀ and the gauge's slope together, and only what
-    // they make of the recorded strains is determined.
+    // Little was recorded at zero strain: the ridge moves R₀ and the gauge's slope together, and only their combination at the recorded
+    // strains is determined.
     let taus: Vec<f64> = fit.law.law.branches.iter().map(|branch| branch.tau_s).collect();
     assert!(taus.len() == 2 && taus[0] < taus[1], "{taus:?}");
 }
 
-/// The contact fails in one row of fifty: the reading doubles. That alone adds 3 % of R₀ to the mean of all readings, and a
-/// law fitted by least squares moves by as much (0.033, with all weights set to one). With bounded influence it moves by no
-/// more than a third of that.
+/// The contact fails in one row of fifty, where the reading doubles. That alone adds 3 % of R₀ to the mean of all readings, and a law
+/// fitted by least squares moves by as much (0.033, with all weights set to one). With bounded influence it moves by at most a third of
+/// that.
 #[test]
 fn rows_without_contact_do_not_bend_the_law() {
     let bench = record(1500.0, 0.0, 1e-3);
@@ -113,7 +113,7 @@ fn every_gauge_family_and_number_of_branches_can_be_fitted() {
     }
 }
 
-/// A calibration as the parameters of a sensor.
+/// Returns a calibration as the parameters of a sensor.
 fn sensor(calibration: &Calibration) -> SensorParams {
     calibration.clone().into_sensor("test", Quantity::Strain, ReadingUnit::Ohm)
 }
@@ -145,15 +145,15 @@ fn calibration_makes_a_filter_that_beats_the_static_inverse_and_knows_how_far() 
     let (filtered, cubic) = (ohmstrain_calib::score(&filtered).unwrap(), ohmstrain_calib::score(&cubic).unwrap());
     assert!(filtered.rmse < 0.5 * cubic.rmse, "{filtered:?} {cubic:?}");
     assert!(filtered.coverage_95.unwrap() > 0.85, "{filtered:?}");
-    // The file format holds everything, to the last bit.
+    // The file format keeps everything, to the last bit.
     let text = toml::to_string(&params).unwrap();
     assert_eq!(toml::from_str::<SensorParams>(&text).unwrap(), params);
-    // What the rested sensor read is no other R₀ than the law's, and twice of it is twice that.
+    // The first reading of a rested sensor determines its R₀: that of the calibration gives the law's R₀, twice that gives twice it.
     let measured = 0.9 * params.rest_reading;
     let params = SensorParams { measured_rest: Some(measured), ..params };
     assert_eq!(params.rest_reading_of(measured), params.rest_reading);
     assert_eq!(params.rest_reading_of(2.0 * measured), 2.0 * params.rest_reading);
-    // An interval that is widened as far as can be is told of.
+    // An interval at its widest is reported.
     assert_eq!(params.widened_most(), [""; 0]);
     let mut wide = params.clone();
     wide.estimators.values_mut().for_each(|of| of.strain_sd_scale = LARGEST_SD_SCALE);
@@ -176,17 +176,17 @@ fn the_estimator_that_does_best_becomes_the_default() {
     let calibration = calibrate(&[bench.samples().head(600)], &[LawOptions::default()], &kinds, count).unwrap();
     let best = calibration.estimators[&calibration.default_estimator].score;
     for kind in kinds {
-        // A single Gaussian has to be better by 0.1.
+        // A single Gaussian must be better by 0.1.
         let handicap = if kind == EstimatorKind::Ekf { 0.1 } else { 0.0 };
         assert!(calibration.estimators[&kind].score + handicap >= best, "{kind:?}");
     }
-    // A step of Nelder-Mead evaluates one or two points, and a shrunken simplex all of its corners.
+    // A step of Nelder-Mead evaluates one or two points, and after a shrinkage all corners of the simplex.
     assert!(calls > announced / 2 && calls < 2 * announced, "{calls} of {announced}");
     let nobody = calibrate(&[bench.samples()], &[LawOptions::default()], &[], |_| ());
     assert!(matches!(nobody.unwrap_err(), CalibrationError::Unsupported(_)));
 }
 
-/// The model is continuous in time: a recording with five times the rows, thinned for the search, says the same.
+/// The model is continuous in time: a recording with five times the rows, thinned for the search, gives the same result.
 #[test]
 fn a_finer_recording_gives_the_same_filter() {
     let coarse = record(1500.0, 0.0, 2e-3);
@@ -203,14 +203,14 @@ fn a_finer_recording_gives_the_same_filter() {
     };
     let ((coarse_law, coarse), (fine_law, fine)) = (of(&coarse), of(&fine));
     for (a, b) in coarse_law.branches.iter().zip(&fine_law.branches) {
-        // The polish of the time constants stops after a number of steps.
+        // The polish of the time constants ends after a fixed number of steps.
         assert!((a.tau_s / b.tau_s).ln().abs() < 0.2, "{a:?} {b:?}");
     }
-    // Readings between readings add little: the log densities agree to a few per cent in the deviation of strain.
+    // Readings in between add little: the log densities agree to a few per cent in the standard deviation of strain.
     assert!((coarse.score - fine.score).abs() < 0.2, "{coarse:?} {fine:?}");
 }
 
-/// A refused row leaves the filter as it was, to the last bit.
+/// A refused row leaves the filter unchanged, to the last bit.
 #[test]
 fn a_refused_row_changes_nothing() {
     let bench = record(1500.0, 0.0, 2e-3);
@@ -294,7 +294,7 @@ fn gaps_do_not_bend_the_law() {
 #[test]
 fn scores_are_what_their_names_say() {
     let row = |truth: f64, strain: f64| ScoredRow { time_s: 0.0, truth, strain, sd: Some(0.1) };
-    // Errors of 0, 0.1, -0.15 and 0.3 with a deviation of 0.1: 50 % intervals reach 0.067, 90 % 0.164, 95 % 0.196.
+    // Errors of 0, 0.1, -0.15 and 0.3 with a standard deviation of 0.1: 50 % intervals reach 0.067, 90 % 0.164, 95 % 0.196.
     let rows = [row(0.0, 0.0), row(1.0, 1.1), row(2.0, 1.85), row(2.0, 2.3), row(f64::NAN, 5.0)];
     let scores = ohmstrain_calib::score(&rows).unwrap();
     assert_eq!(scores.n, 4);

@@ -1,4 +1,4 @@
-//! The closed forms against the formulas as they are printed, and their gradients against finite differences.
+//! The closed forms against the printed formulas, and their gradients against finite differences.
 
 use ohmstrain_calib::closed_form::{
     ClosedForm, Datum, ModulusShape, Moment, Movement, SeparableLaw, value_and_gradient,
@@ -134,7 +134,7 @@ fn cases() -> Vec<Case> {
 fn laws_are_as_printed() {
     for (i, (law, weights, theta, at, printed)) in cases().into_iter().enumerate() {
         let (value, _) = value_and_gradient(law.as_ref(), &weights, &theta, &at);
-        // A handful of operations, each right to half a unit of 2.2e-16.
+        // A few operations, each exact to half a unit of 2.2e-16.
         assert!((value - printed).abs() <= 1e-14 * printed.abs(), "case {i}: {value} for {printed}");
         assert_eq!(law.linear().len(), weights.len(), "case {i}");
         assert_eq!(law.nonlinear().len(), theta.len(), "case {i}");
@@ -158,7 +158,7 @@ fn gradients_are_slopes() {
             };
             let difference = (moved(1.0) - moved(-1.0)) / (2.0 * step);
             // Error of a central difference: rounding 2 ε |R| / 2 h, and h²/6 of the third derivative, which is at most
-            // (5/p)³ of the value for the parameters p of these laws and the share of R that depends on them.
+            // (5/p)³ of the value for the parameters p of these laws and the part of R that depends on them.
             let rounding = 4.0 * f64::EPSILON * value.abs() / step;
             let truncation = 1e-8 * 25.0 * (slope.abs() + value.abs() * 1e-3 / parameters[k].abs());
             assert!((slope - difference).abs() <= rounding + truncation, "case {i}, {k}: {slope} for {difference}");
@@ -166,7 +166,7 @@ fn gradients_are_slopes() {
     }
 }
 
-/// Standard errors of derived quantities are carried over by these gradients.
+/// These gradients propagate standard errors to derived quantities.
 #[test]
 fn derived_quantities_are_slopes_too() {
     let data = [moving(1.0), holding(2.0), holding(9.0)].map(|at| Datum { at, reading: 0.0 });

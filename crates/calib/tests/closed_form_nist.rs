@@ -1,5 +1,4 @@
-//! Certified regressions: parameters and standard deviations as NIST publishes them, from the starts that are found without
-//! the published ones.
+//! Certified regressions: parameters and standard deviations as published by NIST, from our own starts instead of the published ones.
 
 use ohmstrain_calib::closed_form::{
     ClosedForm, ClosedFormFit, Datum, Extent, ModulusShape, Moment, Parameter, Search, SeparableLaw, Unit,
@@ -17,7 +16,7 @@ struct Dataset {
     data: Vec<Datum>,
 }
 
-/// Reads a file as NIST publishes it.
+/// Reads a file in NIST's format.
 fn read(text: &str) -> Dataset {
     let numbers = |text: &str| -> Vec<f64> { text.split_whitespace().map(|cell| cell.parse().unwrap()).collect() };
     let mut out = Dataset { parameters: Vec::new(), residual_sum: f64::NAN, data: Vec::new() };
@@ -62,7 +61,7 @@ impl SeparableLaw for Saturation {
     }
 }
 
-/// A parameter in NIST's terms: value and standard deviation. A time constant τ is a rate 1/τ there, with sd sd(τ)/τ².
+/// Converts a parameter to NIST's terms, with value and standard deviation. A time constant τ is a rate 1/τ there, with sd sd(τ)/τ².
 fn rate(tau: (f64, f64)) -> (f64, f64) {
     (1.0 / tau.0, tau.1 / (tau.0 * tau.0))
 }
@@ -86,12 +85,11 @@ fn certified(dataset: &Dataset, residual_sum: f64, found: &[(f64, f64)], toleran
     close(residual_sum, dataset.residual_sum, sum_tolerance);
 }
 
-/// Half a unit in the eleventh digit, to which parameters and standard deviations are certified, and as much again for
-/// the optimiser.
+/// Half a unit in the eleventh digit, to which parameters and standard deviations are certified, and the same again for the optimiser.
 const DIGITS: f64 = 1e-10;
 
-/// Rounding of the readings, 2.2e-16 of them, is 1e-11 of Lanczos3's residuals and 1e-9 of Lanczos2's, and so of the
-/// standard deviations; parameters move by that share of their own. The tenfold of it, for all sets.
+/// Rounding of the readings, a fraction of 2.2e-16, is 1e-11 of Lanczos3's residuals and 1e-9 of Lanczos2's, and thus of the standard
+/// deviations; parameters move by that fraction of their own. The tolerance is ten times that, for all sets.
 const PARAMETER: f64 = 1e-8;
 
 #[test]
@@ -143,8 +141,8 @@ fn lanczos_2_is_certified() {
     lanczos(include_str!("fixtures/nist/Lanczos2.dat"), PARAMETER, PARAMETER);
 }
 
-/// Its residuals are 1e-13 of the readings, a few hundred units of rounding: parameters have their digits, standard
-/// deviations about two.
+/// Its residuals are 1e-13 of the readings, a few hundred units of rounding: parameters have all their digits, standard deviations about
+/// two.
 #[test]
 fn lanczos_1_is_certified_as_far_as_doubles_go() {
     lanczos(include_str!("fixtures/nist/Lanczos1.dat"), DIGITS, 0.03);

@@ -1,4 +1,4 @@
-//! Fits of readings whose law the test wrote down.
+//! Fits of readings whose law is written down in the test.
 
 use ohmstrain_calib::closed_form::{
     ClosedForm, ClosedFormError, Datum, ModulusShape, Moment, Movement, fit_closed_form,
@@ -11,7 +11,7 @@ use rand_distr::{Distribution, Normal};
 const TRUTH: [(&str, f64); 4] = [("r0", 2500.0), ("v*eta+r1", 1600.0), ("tau0_s", 8.0), ("r0_hold", 0.12)];
 const DURATION_S: f64 = 10.0;
 
-/// A stretch at `rate` and a hold of 40 s, written out as equations 8 and 9 are printed, with v η + r₁ = `offset`.
+/// Simulates a stretch at `rate` and a hold of 40 s by equations 8 and 9 as printed, with v η + r₁ = `offset`.
 fn session(rate: f64, offset: f64, noise: &mut impl FnMut() -> f64) -> Vec<Datum> {
     let (r0, tau_s, fraction) = (TRUTH[0].1, TRUTH[2].1, TRUTH[3].1);
     let before = Movement { duration_s: DURATION_S, travel: rate * DURATION_S };
@@ -50,8 +50,8 @@ fn intervals_cover_the_truth() {
             *count += f64::from((found.value - truth).abs() <= 1.968 * found.standard_error.unwrap());
         }
     }
-    // A binomial count of n = 200 at 0.95 has the standard deviation √(200 · 0.95 · 0.05) = 3.1; four of them, since four
-    // parameters are asked: less than 1 in 4000 by chance.
+    // A binomial count of n = 200 at 0.95 has the standard deviation √(200 · 0.95 · 0.05) = 3.1. Four parameters are tested, so the
+    // tolerance is four of them: less than 1 in 4000 by chance.
     let n = SEEDS as f64;
     for (count, (name, _)) in covered.iter().zip(TRUTH) {
         assert!((count - 0.95 * n).abs() <= 4.0 * (n * 0.95 * 0.05_f64).sqrt(), "{name}: {count}");
@@ -68,7 +68,7 @@ fn several_speeds_tell_the_dash_pot_from_the_offset() {
     let fit = fit_closed_form(law.as_ref(), &data).unwrap();
     for (name, truth) in [("eta", eta), ("r1", r1), TRUTH[0], TRUTH[2], TRUTH[3]] {
         let found = fit.get(name).unwrap();
-        // One draw of a normal deviate is within 4 of its deviations but for 1 in 16 000.
+        // A normal deviate is within 4 of its standard deviations except for 1 in 16 000.
         assert!((found.value - truth).abs() < 4.0 * found.standard_error.unwrap(), "{name}: {found:?}");
     }
 }
@@ -84,7 +84,7 @@ fn at_one_speed_they_are_not_told_apart() {
     assert!(fit.get("r1_hold").unwrap().standard_error.is_none());
 }
 
-/// A straight line has no time constant: it runs into the limit and says so.
+/// A straight line has no time constant: the fitted one ends on its limit, which is reported.
 #[test]
 fn a_time_constant_that_is_not_there_has_no_error() {
     let mut noise = gaussian(1);
@@ -112,7 +112,7 @@ fn information_criteria_choose_the_law_that_made_the_readings() {
     let bic =
         |law: ClosedForm| fit_closed_form(law.law(ModulusShape::SINGLE, false, 1500.0).as_ref(), &data).unwrap().bic;
     let best = bic("eq1".parse().unwrap());
-    // Equation 1 is a Prony series of two in other parameters.
+    // Equation 1 is a Prony series of two terms in other parameters.
     assert!((best - bic("prony:2".parse().unwrap())).abs() < 1e-6);
     for worse in ["eq2", "eq6", "eq9", "kww", "prony:1", "prony:3"] {
         assert!(best < bic(worse.parse().unwrap()), "{worse}");

@@ -1,8 +1,8 @@
-//! The ranked probability score against its definition.
+//! The continuous ranked probability score against its definition.
 
 use ohmstrain_calib::ScoredRow;
 
-/// Normal distribution function by Simpson's rule over the density, from the mean on.
+/// Returns the normal distribution function by Simpson's rule over the density, from the mean on.
 fn distribution(z: f64) -> f64 {
     let steps = 2000;
     let h = z / f64::from(steps);
@@ -11,8 +11,8 @@ fn distribution(z: f64) -> f64 {
     0.5 + h / 3.0 * (density(0.0) + inner + density(z))
 }
 
-/// ∫ (F(x) - 1{x ≥ truth})² dx, by the midpoint rule over 12 deviations to each side of mean and truth, split at the
-/// jump.
+/// Returns ∫ (F(x) - 1{x ≥ truth})² dx, by the midpoint rule over 12 standard deviations to each side of mean and
+/// truth, split at the jump.
 fn by_definition(mean: f64, sd: f64, truth: f64) -> f64 {
     let (low, high) = (mean.min(truth) - 12.0 * sd, mean.max(truth) + 12.0 * sd);
     let integral = |from: f64, to: f64, step: f64| {
@@ -44,10 +44,11 @@ fn without_a_deviation_it_is_the_absolute_error() {
     assert_eq!((scores.width_95, scores.width_95_percent_fs), (None, None));
 }
 
-/// Errors that are too large and intervals that are too wide both cost: a deviation is best where it is the error's.
+/// Errors that are too large and intervals that are too wide both cost: the best standard deviation is that of the
+/// error.
 #[test]
 fn neither_wide_nor_narrow_pays() {
-    // Errors of ±0.1 in turn.
+    // Errors of alternating sign, ±0.1.
     let score = |sd: f64| {
         let row = |k: u32| ScoredRow {
             time_s: f64::from(k),

@@ -1,4 +1,4 @@
-//! Channels of one strain, with errors and faults that the test makes up.
+//! Channels of one strain, with errors and faults made up by the test.
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ const ROWS: usize = 1600;
 const STEP_S: f64 = 0.1;
 /// R₀ of each channel.
 const REST: [f64; CHANNELS] = [1000.0, 1500.0, 900.0, 2000.0];
-/// Standard deviations of the filters' errors; a half of the variance of each is common to all.
+/// Standard deviations of the filters' errors; half of the variance of each is common to all.
 const SD: [f64; CHANNELS] = [0.010, 0.012, 0.012, 0.015];
 
 /// A motion, the readings of each channel, and estimates of each channel's filter.
@@ -25,7 +25,7 @@ struct Made {
     own: Vec<Vec<f64>>,
 }
 
-/// Readings by curves that differ, with a dash-pot in two of them, so that one of them alone does not tell the strain.
+/// Simulates readings by different curves, two of them with a dash-pot, so that no single one determines the strain.
 fn made(seed: u64, speed: f64) -> Made {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut normal = move || -> f64 { StandardNormal.sample(&mut random) };
@@ -36,7 +36,7 @@ fn made(seed: u64, speed: f64) -> Made {
     let (mut reading, mut own) = (vec![Vec::new(); CHANNELS], vec![Vec::new(); CHANNELS]);
     for k in 0..ROWS {
         let rate = if k == 0 { 0.0 } else { (strain[k] - strain[k - 1]) / STEP_S };
-        // Errors of a filter are alike over two seconds.
+        // Errors of a filter are correlated over two seconds.
         for error in &mut errors {
             *error = 0.95 * *error + (1.0_f64 - 0.95 * 0.95).sqrt() * normal();
         }
@@ -72,7 +72,7 @@ fn fit(made: &Made) -> Result<FusionFit, CalibrationError> {
     fit_fusion(&(0..CHANNELS).map(channel).collect::<Vec<_>>(), Quantity::Strain, "a test")
 }
 
-/// Runs a fusion over a motion, of which `change` may change the logarithms of a row.
+/// Runs a fusion over a motion; `change` may modify the logarithms of a row.
 fn run(fit: &FusionFit, made: &Made, change: impl Fn(usize, &mut Vec<f64>)) -> Vec<Fused> {
     let mut fusion = Fusion::new(Arc::new(fit.params.clone()));
     let step = |k: usize| {
@@ -98,8 +98,9 @@ fn covered(rows: &[Fused], made: &Made) -> f64 {
     rows.iter().zip(&made.strain).filter(holds).count() as f64 / rows.len() as f64
 }
 
-/// Another motion of the same speeds: the average of the four, all alike, would leave a half of the variance and an eighth of the other
-/// half, 0.79 of the best channel's error. All readings together say more: the strain to 0.01/3 and what the rates add.
+/// Tests another motion of the same speeds. The average of the four, all equally good, would leave half of the variance and an eighth of
+/// the other half, 0.79 of the best channel's error. All readings together contain more information: the strain to 0.01/3, and that of the
+/// rates.
 #[test]
 fn fused_channels_err_less_than_the_best_and_cover() {
     let (seen, new) = (made(1, 0.9), made(2, 0.8));
@@ -112,16 +113,17 @@ fn fused_channels_err_less_than_the_best_and_cover() {
     assert!(covered(&rows, &new) > 0.9, "{}", covered(&rows, &new));
     let promised = fit.fused.unwrap();
     assert!(promised.rmse < 0.79 * fit.channels[0].unwrap().rmse, "{promised:?}");
-    // Nothing is wrong with any of them: of the rows of other blocks one in a hundred was as far, and half as far again is beyond.
+    // No channel is faulty: one in a hundred rows of other blocks was as far, and the limit is half as far again.
     assert!(rows.iter().filter(|row| row.faulty.is_some() || row.is_unlike).count() < ROWS / 100);
-    // The channels' errors are correlated by a half, of which a half is kept. Over two seconds each, 160 s are 80 errors: the
-    // correlation is known to (1 - 0.25) / 80^½, 0.08, and a half of it to 0.04.
+    // The channels' errors have a correlation of a half, of which the shrinkage keeps half. With two seconds each, 160 s are 80 errors: the
+    // correlation is known to (1 - 0.25) / 80^½, 0.08, and half of it to 0.04.
     let covariance = &fit.params.error_covariance;
     let correlation = covariance[0][1] / (covariance[0][0] * covariance[1][1]).sqrt();
     assert!((correlation - 0.25).abs() < 0.12, "{correlation}");
 }
 
-/// One channel shorted, open, dead or with another gain: it is found, the estimate is nearly as good as without it, and it comes back.
+/// One channel is shorted, open, dead or has another gain. It is found, the estimate is nearly as good as without it, and it is used again
+/// afterwards.
 #[test]
 fn a_faulty_channel_is_left_out_and_comes_back() {
     let (seen, new) = (made(1, 0.9), made(2, 0.8));
@@ -134,19 +136,19 @@ fn a_faulty_channel_is_left_out_and_comes_back() {
                     row[channel] = if fault == "gain" { row[channel] + ln_r } else { ln_r };
                 }
             });
-            // Three channels in place of four, equally good, leave at most 4/3 of the variance.
+            // Three channels instead of four, equally good, leave at most 4/3 of the variance.
             assert!(error(&rows, &new) < 1.25 * clean, "{channel} {fault}: {} {clean}", error(&rows, &new));
             let found = rows[400..1200].iter().filter(|row| row.faulty == Some(channel)).count();
             let wrong = rows.iter().filter(|row| row.faulty.is_some_and(|found| found != channel)).count();
             assert!((fault == "open" || found > 780) && wrong < 8, "{channel} {fault}: {found} {wrong}");
-            // A second after its end nothing is left of it but for the low-passes.
+            // A second after its end only the low-passes still contain the fault.
             assert!(rows[1210..].iter().filter(|row| row.faulty.is_some()).count() < 8, "{channel} {fault}");
         }
     }
 }
 
-/// Cables exchanged at one end of the body, and curves that another posture has changed: no channel alone is to blame. The interval then
-/// holds the truth.
+/// Cables exchanged at one end of the body, and curves changed by another posture: no single channel is at fault. The interval then covers
+/// the truth.
 #[test]
 fn readings_that_calibration_has_not_seen_are_doubted() {
     let (seen, new) = (made(1, 0.9), made(2, 0.8));

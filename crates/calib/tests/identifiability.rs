@@ -1,4 +1,4 @@
-//! Advice where the right advice is known, the table of structures, and the block bootstrap.
+//! Advice in cases with known right advice, the table of structures, and the block bootstrap.
 
 use ohmstrain_calib::likelihood::Bound;
 use ohmstrain_calib::{GaugeFamily, Identifiability, LawOptions, bootstrap_law, compare_structures, identifiability};
@@ -23,7 +23,7 @@ fn law(tau_s: f64) -> LawParams {
     }
 }
 
-/// Strain that goes from one target to the next: target, speed per second, hold in seconds.
+/// Returns a strain that moves from one target to the next: target, speed per second, hold in seconds.
 fn path(legs: &[(f64, f64, f64)]) -> Vec<f64> {
     let mut strain = vec![0.0];
     let mut at = 0.0_f64;
@@ -36,7 +36,8 @@ fn path(legs: &[(f64, f64, f64)]) -> Vec<f64> {
     strain
 }
 
-/// A sensor of one branch led along a strain that moves linearly between rows, with correlated noise of `sd`.
+/// Returns a recording of a sensor with one branch, for a strain that is linear between rows, with correlated noise of
+/// `sd`.
 fn record(law: &LawParams, strain: Vec<f64>, sd: f64, seed: u64) -> Bench {
     let mut rng = ChaCha12Rng::seed_from_u64(seed);
     let GaugeParams::Polynomial { coefficients: [a, b, _] } = law.gauge else { unreachable!() };
@@ -73,7 +74,7 @@ fn one_speed_hides_the_dash_pot_and_a_second_one_shows_it() {
     assert!(said(&one), "{one}");
     assert!(!said(&two), "{two}");
     assert!(one.condition_number > 100.0 * two.condition_number, "{one}{two}");
-    // The errors say so too. What little tells the dash-pot from R₀ at one speed are the rows in which it turns around.
+    // The errors agree. At one speed, only the rows in which it turns around distinguish the dash-pot from R₀.
     let error = |found: &Identifiability, name: &str| {
         let at = found.parameters.names.iter().position(|known| known == name).unwrap();
         found.parameters.standard_errors[at]
@@ -147,7 +148,7 @@ fn correlations_are_correlations() {
     for (i, row) in found.correlation.iter().enumerate() {
         assert_eq!(row[i], 1.0);
         for (j, correlation) in row.iter().enumerate() {
-            // Symmetric to the rounding of a product of three matrices of a dozen columns.
+            // Symmetric up to the rounding of a product of three matrices of a dozen columns.
             assert!(correlation.abs() <= 1.0 + 1e-9 && (correlation - found.correlation[j][i]).abs() < 1e-6);
         }
     }
@@ -166,7 +167,7 @@ fn the_structure_that_made_the_recording_scores_best_among_fewer_branches() {
     assert!(one.aic < none.aic && one.bic < none.bic, "{scores:?}");
     // Constant, cubic, dash-pot; the branch adds four gains and its time constant.
     assert_eq!((none.parameters, one.parameters), (6, 11));
-    // Schwarz asks more for a parameter than Akaike, so the richest structure gains less by it.
+    // Schwarz penalises a parameter more than Akaike, so the richest structure gains less.
     let three = at(3, GaugeFamily::Polynomial);
     assert!(three.bic - one.bic > three.aic - one.aic, "{scores:?}");
 }
@@ -182,8 +183,8 @@ fn the_bootstrap_repeats_with_its_seed_and_agrees_with_the_jackknife() {
     assert_eq!((one.replicates, &one.names, &one.values), (60, &found.names, &found.values));
     for (i, name) in one.names.iter().enumerate() {
         let width = (one.upper[i] - one.lower[i]) / (2.0 * 1.96 * found.standard_errors[i]);
-        // Two estimates of one width, each from forty blocks and therefore good to 1/√80 = 11 %, and percentiles of
-        // sixty draws, good to 15 % or so: four deviations of both together are 0.75.
+        // Two estimates of one width, each from forty blocks and thus accurate to 1/√80 = 11 %, and percentiles of
+        // sixty draws, accurate to about 15 %: four deviations of both together are 0.75.
         assert!((0.5..=1.75).contains(&width), "{name}: {width}");
     }
 }
@@ -192,7 +193,7 @@ fn the_bootstrap_repeats_with_its_seed_and_agrees_with_the_jackknife() {
 fn a_time_constant_on_its_bound_does_not_hold_up_the_other() {
     let mut slow = law(4.0);
     slow.branches.push(BranchParams { tau_s: 400.0, ..slow.branches[0] });
-    // A quarter of the recording is less than 400 s, so the second time constant ends on its bound.
+    // A quarter of the recording is shorter than 400 s, so the second time constant ends on its bound.
     let bench = wandering();
     let from = |tau_s: f64| {
         let mut start = slow.clone();
@@ -202,6 +203,6 @@ fn a_time_constant_on_its_bound_does_not_hold_up_the_other() {
     let (near, far) = (from(4.0), from(9.0));
     let tau = near.parameters.names.iter().position(|name| name == "branches[0].tau_s").unwrap();
     let (value, error) = (near.parameters.values[tau], near.parameters.standard_errors[tau]);
-    // The same minimum from both starts, to a small part of its standard error.
+    // The same minimum from both starts, to a small fraction of its standard error.
     assert!((value - far.parameters.values[tau]).abs() < 0.05 * error, "{near}{far}");
 }

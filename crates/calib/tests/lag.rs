@@ -1,11 +1,11 @@
-//! The lag of a reference, on sensors whose reference was moved.
+//! The lag of a reference, on sensors whose reference was shifted.
 
 use std::f64::consts::TAU;
 
 use ohmstrain_calib::{Lag, LagError, Samples, reference_lag};
 
-/// A polynomial gauge and two branches with gains of their own for stretching and releasing, no dash-pot, in explicit
-/// Euler steps of a millisecond; ten rows a second for 150 s. The reference comes `lag_s` late.
+/// Returns the lag found for a polynomial gauge and two branches with different gains for stretching and releasing, no dash-pot, in
+/// explicit Euler steps of a millisecond; ten rows a second for 150 s. The reference is `lag_s` late.
 fn lag_found(lag_s: f64) -> Result<Lag, LagError> {
     let strain_at = |t: f64| 0.15 + 0.08 * (TAU * t / 17.0).sin() + 0.06 * (TAU * t / 7.3).sin();
     let (mut time_s, mut reading, mut strain) = (vec![], vec![], vec![]);
@@ -29,7 +29,7 @@ fn lag_found(lag_s: f64) -> Result<Lag, LagError> {
     reference_lag(&samples)
 }
 
-/// Readings that are a function of the strain, without noise: half a period later they are one again.
+/// Readings are a function of the strain, without noise, and so they are of the strain half a period later.
 #[test]
 fn what_is_explained_whole_has_no_lag() {
     let time_s: Vec<f64> = (0..1200).map(|k| 0.1 * f64::from(k)).collect();
@@ -42,15 +42,15 @@ fn what_is_explained_whole_has_no_lag() {
 #[test]
 fn a_moved_reference_is_found_out() {
     for lag_s in [-6.0, -0.4, 0.0, 0.15, 0.6, 2.0, 3.0] {
-        // One row, 0.1 s, is what a recording can show.
+        // One row, 0.1 s, is the resolution of a recording.
         let found = lag_found(lag_s).unwrap();
         println!("{found:?} for {lag_s}");
         assert!((found.lag_s - lag_s).abs() < 0.1, "{found:?} for {lag_s}");
     }
 }
 
-/// A sine of 30 s of a sensor that relaxes over half a second to two minutes, and drifts: more than the law that is fitted has,
-/// which takes a lag for relaxation there.
+/// A sine of 30 s of a sensor that relaxes over half a second to two minutes, and drifts. The fitted law has fewer time constants, and
+/// mistakes a lag for relaxation there.
 #[test]
 fn a_law_does_not_absorb_the_lag_of_a_slow_sine() {
     for lag_s in [-6.0, -4.0, 0.0, 4.0, 6.0] {
@@ -58,12 +58,12 @@ fn a_law_does_not_absorb_the_lag_of_a_slow_sine() {
         let found = reference_lag(&Samples::new(&time_s, &reading, &strain).unwrap()).unwrap();
         println!("{found:?} for {lag_s}");
         assert_eq!(found.is_sure(), lag_s != 0.0, "{found:?} for {lag_s}");
-        // Half a step of the search, and what the sensor may lag itself.
+        // Half a step of the search, and the sensor's possible own lag.
         assert!((found.lag_s - lag_s).abs() < 0.25 + found.own_s, "{found:?} for {lag_s}");
     }
 }
 
-/// Six movements of 5 s between holds of 45 s: there a gauge alone takes relaxation for a lag.
+/// Six movements of 5 s between holds of 45 s, where a gauge alone mistakes relaxation for a lag.
 #[test]
 fn a_gauge_has_no_say_where_a_body_rests() {
     let ramps = |t: f64| 0.3 * ((t % 100.0) / 5.0).min(1.0).min((55.0 - t % 100.0) / 5.0).max(0.0);
@@ -72,8 +72,8 @@ fn a_gauge_has_no_say_where_a_body_rests() {
     assert!(found.as_ref().map_or(true, |lag| !lag.is_sure() && lag.own_s == 0.0), "{found:?}");
 }
 
-/// Twelve quick movements of irregular height within five seconds, of a sensor without a lag: the law, which looks no further than a
-/// tenth of a recording, took one movement for another there. The reference is moved by several movements.
+/// Twelve quick movements of irregular height within five seconds, of a sensor without a lag. The law, which searches no further than a
+/// tenth of a recording, confused movements there. The reference is shifted by several movements.
 #[test]
 fn a_short_recording_tells_a_lag_of_several_movements() {
     for lag_s in [-2.0, -0.9, 0.0, 0.7, 1.6] {
@@ -93,7 +93,7 @@ fn a_short_recording_tells_a_lag_of_several_movements() {
     }
 }
 
-/// One stroke of 10 s and a hold, or two strokes, of a sensor that relaxes: any lag would explain as much.
+/// One stroke of 10 s and a hold, or two strokes, of a sensor that relaxes: any lag would explain equally much.
 #[test]
 fn a_stroke_or_two_tell_no_lag() {
     let (stroke, hold) = (|t: f64| 0.3 * (t / 10.0).min(1.0), |t: f64| 0.3 * (t / 10.0).min(2.0 - t / 10.0).max(0.0));

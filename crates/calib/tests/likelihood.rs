@@ -1,4 +1,4 @@
-//! The likelihood on readings alone: the Nile as other programs have it.
+//! The likelihood on readings alone, compared with other programs on the Nile data.
 
 use nalgebra::{matrix, vector};
 use ohmstrain_calib::likelihood::{Bound, Likelihood, ModelFamily, Parameter, ReadingSeries};
@@ -19,8 +19,9 @@ const NILE: [f64; 100] = [
     919.0, 718.0, 714.0, 740.0,
 ];
 
-/// Maximum, standard errors and profile intervals of the local level model with an exact diffuse start; made by
-/// statsmodels and an independent implementation (`nile.json`), in accord with the published 15099 / 1469.1 / -632.54.
+/// Maximum, standard errors and profile intervals of the local level model with an exact diffuse start, computed by
+/// statsmodels and an independent implementation (`nile.json`), in agreement with the published 15099 / 1469.1 /
+/// -632.54.
 mod published {
     pub const MAXIMUM: [f64; 2] = [15098.519468532784, 1469.1760283280664];
     pub const LOG_LIKELIHOOD: f64 = -632.5456251030405;
@@ -29,7 +30,7 @@ mod published {
     pub const PROFILES: [[f64; 2]; 2] = [[9618.798036080254, 22123.418574553514], [252.4703673964374, 5984.9562037585]];
 }
 
-/// A random walk seen with noise; variances of readings and of the level's steps.
+/// A random walk observed with noise; variances of readings and of the level's steps.
 #[derive(Clone, Copy)]
 struct Level<T>(T, T);
 
@@ -58,13 +59,13 @@ impl ModelFamily<1, 1> for LocalLevel {
         Ok(Level(parameters[0], parameters[1]))
     }
 
-    /// Nothing is known before the first reading: afterwards the level is that reading, give or take its noise.
+    /// Diffuse start: after the first reading the level is that reading, with its noise.
     fn start<T: Scalar>(&self, model: &Self::Model<T>) -> Belief<T, 1, 1> {
         Belief::independent(vector![T::of(NILE[0])], &[model.0])
     }
 }
 
-/// The readings that are left once the first one has made the start.
+/// Returns the readings after the first, which determined the start.
 fn after_the_first() -> [f64; 100] {
     let mut rest = NILE;
     rest[0] = f64::NAN;
@@ -83,8 +84,8 @@ fn the_nile() {
     let likelihood = Likelihood::<_, 1, 1> { family: &LocalLevel, parameters: &parameters, recordings: &recordings };
     let fit = likelihood.fit().unwrap();
     assert!(fit.converged && fit.gradient_norm < 1e-8, "{fit:?}");
-    // Both programs stop where the likelihood no longer rises in double precision: a flat maximum, 1e-8 standard errors
-    // of rounding in ln θ for us and 1e-7 for a search without derivatives.
+    // Both programs stop where the likelihood no longer rises in double precision: at a flat maximum, with 1e-8
+    // standard errors of rounding in ln θ for ours and 1e-7 for a search without derivatives.
     assert_close(fit.log_likelihood.value, published::LOG_LIKELIHOOD, 1e-13, "log-likelihood");
     for (i, parameter) in fit.parameters.iter().enumerate() {
         assert_close(parameter.value, published::MAXIMUM[i], 1e-6, "maximum");
@@ -130,10 +131,10 @@ fn a_parameter_on_its_bound_is_reported_and_the_others_are_maximal() {
     assert_eq!((level.bound, level.standard_error), (Some(Bound::Lower), None));
     assert_close(level.value, 2000.0, 1e-12, "bound");
     assert!(fit.converged && reading.bound.is_none() && reading.standard_error.is_some());
-    // The likelihood falls to both sides of the other parameter.
+    // The likelihood falls on both sides of the other parameter.
     let at = |value: f64| likelihood.log_likelihood(&[value, level.value]).unwrap().value;
     assert!(at(reading.value) > at(reading.value * 1.001) && at(reading.value) > at(reading.value * 0.999));
-    // The search for an end starts at a maximum with no slope, which a parameter on its bound has not.
+    // The search for an end starts at a maximum with zero slope, which a parameter on its bound does not have.
     let none = likelihood.profile_interval(&fit, 1);
     assert_eq!((none.lower, none.upper), (None, None));
     let held = likelihood.profile_interval(&fit, 0);

@@ -19,8 +19,8 @@ const TRUE_MOTION: MotionParams =
 const FREE: [NoiseParameter; 4] =
     [NoiseParameter::ReadingSd, NoiseParameter::BaselineSd, NoiseParameter::RateSd, NoiseParameter::RateTime];
 
-/// A law that is linear and the same in both directions, so that the filter is exact and so is the likelihood; `lean`
-/// makes the directions differ.
+/// Returns a law that is linear and the same in both directions, so that the filter and thus the likelihood are exact;
+/// `lean` makes the directions differ.
 fn law(lean: f64) -> LawParams {
     LawParams {
         extend_viscosity_s: 0.02,
@@ -37,7 +37,7 @@ fn law(lean: f64) -> LawParams {
     }
 }
 
-/// Readings drawn from the model.
+/// Draws readings from the model.
 fn simulate(seed: u64, rows: usize) -> (Vec<f64>, Vec<f64>) {
     let MotionParams { rate_time_s, rate_sd_per_s, strain_mean, strain_sd } = TRUE_MOTION;
     let motion = Motion::ornstein_uhlenbeck(rate_time_s, rate_sd_per_s, strain_mean, strain_sd).unwrap();
@@ -57,8 +57,8 @@ fn simulate(seed: u64, rows: usize) -> (Vec<f64>, Vec<f64>) {
         time_s.push(row as f64 * STEP_S);
         value.push(observation.value + observation.variance.sqrt() * normal());
         let transition: Transition<f64, 4, 10> = model.transition(&step, &state, direction);
-        // The branch has no noise of its own: strain, rate and it move in two directions only, hence a root by
-        // eigenvalues.
+        // The branch has no noise of its own: strain, rate and branch move in two directions only, hence a square root
+        // by eigenvalues.
         let eigen = transition.noise.to_matrix().symmetric_eigen();
         state = transition.mean;
         for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
@@ -68,7 +68,7 @@ fn simulate(seed: u64, rows: usize) -> (Vec<f64>, Vec<f64>) {
     (time_s, value)
 }
 
-/// A start that is off by a factor of two or three everywhere.
+/// Returns a start that is wrong by a factor of two or three everywhere.
 fn start() -> NoiseStart {
     NoiseStart {
         noise: NoiseParams {
@@ -113,8 +113,8 @@ fn known_noise_is_found_within_its_standard_errors() {
             all += 1;
         }
     }
-    // 48 draws. Three standard errors hold 0.9973 of them: more than one miss has a probability of 0.8 %, more than two
-    // of 0.03 %. One standard error holds 0.683: 32.8 ± 3.2, three of which are 23 to 42.
+    // 48 draws. Three standard errors cover 0.9973 of them: more than one miss has a probability of 0.8 %, more than
+    // two of 0.03 %. One standard error covers 0.683: 32.8 ± 3.2, three of which are 23 to 42.
     println!("{within_one} within one and {within_three} within three of {all}");
     assert_eq!(all, 48);
     assert!(within_three >= 46, "{within_three}");
@@ -132,7 +132,7 @@ fn what_the_electronics_add_is_not_found_again() {
         let problem = LikelihoodProblem { recordings: &recordings, law: &law, start: &start, free: &free };
         problem.log_likelihood().unwrap().value
     };
-    // 3² + 4² = 5². Half of the rows say nothing of their electronics, and a missing cell adds nothing.
+    // 3² + 4² = 5². Half of the rows have no electronics' deviation, and a missing cell adds nothing.
     let split = at(3e-3, &vec![4e-3; 1000]);
     assert!((split - at(5e-3, &[])).abs() < 1e-9 * split.abs());
     assert_eq!(at(3e-3, &[f64::NAN; 10]), at(3e-3, &[]));
@@ -144,7 +144,7 @@ fn what_the_readings_do_not_say_is_warned_of() {
     let (time_s, value) = simulate(1, 1000);
     let recordings = [ReadingSeries { time_s: &time_s, value: &value, extra_sd: &[] }];
     let mut start = NoiseStart { noise: TRUE_NOISE, motion: TRUE_MOTION };
-    // The simulated branch does not wander.
+    // The simulated branch has no noise.
     start.noise.branch_sd = 1e-3;
     let found = noise_of(&recordings, &law(0.0), &start, &[NoiseParameter::BranchSd]).unwrap();
     assert!(!found.warnings.is_empty() && found.warnings[0].contains("branch_sd"), "{found:?}");
@@ -193,7 +193,7 @@ impl ModelFamily<4, 10> for Switched {
 
 const POINT: [f64; 5] = [3e-3, 0.25, 0.4, 0.015, 2.0];
 
-/// Exact derivatives against central differences of the log-likelihood, in the logarithms.
+/// Compares exact derivatives with central differences of the log-likelihood, in the logarithms.
 fn check_derivatives<F: ModelFamily<4, 10>>(family: &F) {
     let (time_s, mut value) = simulate(3, 300);
     value[40..60].fill(f64::NAN);
@@ -208,8 +208,8 @@ fn check_derivatives<F: ModelFamily<4, 10>>(family: &F) {
     };
     let exact = likelihood.derivatives(&POINT).unwrap();
     assert!((exact.log_likelihood.value - at(&POINT)).abs() < 1e-9 * exact.log_likelihood.value.abs());
-    // Curvatures are of the order of the number of readings, 280; so are third and fourth derivatives. A step h errs by
-    // h²/6 of those, 3e-8 of them, and by 1e-12 · value / h of rounding, 1e-6.
+    // Curvatures are of the order of the number of readings, 280, and so are third and fourth derivatives. A step h has
+    // an error of h²/6 of those, 3e-8 of them, and of 1e-12 · value / h by rounding, 1e-6.
     let h = 4e-4;
     let size = exact.hessian.amax();
     for i in 0..5 {

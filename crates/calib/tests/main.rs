@@ -1,4 +1,4 @@
-//! Fits of sensors whose law the test wrote down. One test program; a module for each subject.
+//! Fits of sensors whose law is written down in the test. One test program with a module for each subject.
 
 mod baselines;
 mod bench;

@@ -1,13 +1,13 @@
-//! References from marks, against motions that the test writes down.
+//! References from marks, against motions written down in the test.
 
 use ohmstrain_calib::{Mark, MarksError, Samples, marked_references};
 
 const STEP_S: f64 = 0.1;
-/// In a rest of 5 s the second half of the relaxation is exp(-2.5/3) = 0.43 of the first. Holds much shorter than the relaxation are not
-/// told from slow moves.
+/// Time constant of the relaxation, s. In a rest of 5 s its second half is exp(-2.5/3) = 0.43 of the first. Holds much shorter than the
+/// relaxation cannot be distinguished from slow moves.
 const RELAXATION_S: f64 = 3.0;
 
-/// Resistance of a sensor whose strain relaxes with one time constant, by explicit Euler steps: no code of the library's.
+/// Returns the resistance of a sensor that relaxes with one time constant, by explicit Euler steps and without code of the library.
 fn resistance(strain: &[f64]) -> Vec<f64> {
     let mut slow = strain[0];
     let relaxed = |&x: &f64| {
@@ -17,7 +17,7 @@ fn resistance(strain: &[f64]) -> Vec<f64> {
     strain.iter().map(relaxed).collect()
 }
 
-/// To 0.2 in 3 s, a hold of `held_s`, back in 3 s, a rest of 5 s, again and again; at constant speed.
+/// Returns a repeated motion at constant speed: to 0.2 in 3 s, a hold of `held_s`, back in 3 s, a rest of 5 s.
 fn strain(time_s: f64, held_s: f64) -> f64 {
     let in_cycle = time_s % (11.0 + held_s);
     let up = (in_cycle - 5.0) / 3.0;
@@ -31,7 +31,7 @@ fn holds_are_found_and_the_motion_between_them() {
     let time_s: Vec<f64> = (0..1700).map(|k| STEP_S * f64::from(k)).collect();
     let truth: Vec<f64> = time_s.iter().map(|t| strain(*t, held_s)).collect();
     let ohm = resistance(&truth);
-    // One mark in each rest and each hold, off by up to 0.2 s and 2 % of the span.
+    // One mark in each rest and each hold, with errors of up to 0.2 s and 2 % of the span.
     let marks: Vec<Mark> = (0..10)
         .flat_map(|cycle| {
             let (start, off) = (17.0 * f64::from(cycle), [0.2, -0.1, 0.1, -0.2][cycle as usize % 4]);
@@ -46,10 +46,10 @@ fn holds_are_found_and_the_motion_between_them() {
     let known: Vec<usize> = (0..time_s.len()).filter(|&k| found.strain[k].is_finite()).collect();
     let squares = known.iter().map(|&k| (found.strain[k] - truth[k]).powi(2)).sum::<f64>();
     let error = (squares / known.len() as f64).sqrt() / 0.2;
-    // Ends of holds are known to 0.6 s. At a third of the span per second that is a fifth of the span during the moves, which take 6 s
-    // of 17: 0.119 over all.
+    // Ends of holds are known to 0.6 s. At a third of the span per second that is a fifth of the span during the moves, which take 6 s of
+    // 17 s: 0.119 over all.
     assert!(error < 0.119, "{error}");
-    // Straight lines from mark to mark know no holds.
+    // Straight lines from mark to mark contain no holds.
     let line = |t: f64| {
         let next = marks.partition_point(|mark| mark.time_s < t).clamp(1, marks.len() - 1);
         let (a, b) = (marks[next - 1], marks[next]);

@@ -1,4 +1,4 @@
-//! Coverage of the intervals of a law's parameters: the share that holds the parameters of the recording.
+//! Coverage of the intervals of a law's parameters: the fraction that contains the true parameters.
 //!
 //! The table in `docs/parameter-coverage.md` comes from
 //! `cargo test --release -p ohmstrain-calib --test all parameter_coverage:: -- --ignored --nocapture`.
@@ -14,7 +14,8 @@ use rand_distr::{Distribution, StandardNormal};
 const REST_OHM: f64 = 1500.0;
 /// Readings ten times a second for two hundred seconds.
 const ROWS: usize = 2000;
-/// Deviation of the noise, relative to R₀, and its correlation from row to row: a memory of 0.3 s.
+/// Standard deviation of the noise, relative to R₀, and its correlation from row to row, with a correlation time of 0.3
+/// s.
 const NOISE: f64 = 2e-3;
 const MEMORY: f64 = 0.7;
 /// Half the width of a 95 % interval, in standard errors.
@@ -37,7 +38,7 @@ fn law() -> LawParams {
     }
 }
 
-/// The true parameters, by the names of the fit.
+/// Returns the true parameters, by the names of the fit.
 fn truth(name: &str) -> f64 {
     let law = law();
     let GaugeParams::Polynomial { coefficients } = law.gauge else { unreachable!() };
@@ -58,7 +59,7 @@ fn truth(name: &str) -> f64 {
     }
 }
 
-/// The law along a smooth strain, one explicit Euler step of two milliseconds at a time.
+/// Simulates the law along a smooth strain, one explicit Euler step of two milliseconds at a time.
 fn noiseless() -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     let strain_at = |t: f64| {
         0.16 + 0.09 * (TAU * t / 23.0).sin() + 0.04 * (TAU * t / 7.3 + 1.0).sin() + 0.03 * (TAU * t / 3.1).sin()
@@ -87,7 +88,7 @@ fn noiseless() -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     (time_s, ratio, strains)
 }
 
-/// Count of intervals that held the truth, parameter by parameter, with estimates and errors.
+/// Counts of intervals that covered the truth, parameter by parameter, with estimates and errors.
 #[derive(Default)]
 struct Tally {
     names: Vec<String>,
@@ -114,7 +115,7 @@ impl Tally {
         (mean, square.sqrt())
     }
 
-    /// Coverage in per cent, mean standard error over scatter, bias over scatter.
+    /// Returns the coverage in per cent, mean standard error over scatter, bias over scatter.
     fn summary(&self, i: usize) -> (f64, f64, f64) {
         let (mean, scatter) = Self::column(&self.estimates, i);
         let share = 100.0 * self.held[i] as f64 / self.estimates.len() as f64;
@@ -122,7 +123,7 @@ impl Tally {
     }
 }
 
-/// Each of `count` recordings as the noise of its own seed makes it.
+/// Visits `count` recordings, each with the noise of its own seed.
 fn for_each_recording(count: u64, mut visit: impl FnMut(&Samples)) {
     let (time_s, ratio, strain) = noiseless();
     for seed in 0..count {
@@ -147,7 +148,7 @@ fn intervals_without_the_ridge_hold_the_truth() {
         println!("{name}: {share:.0} %, error over scatter {error:.2}, bias over scatter {bias:+.2}");
         // Binomial with 40 draws of 0.95: fewer than 33 have a probability of 1e-4, for each of eleven parameters.
         assert!(tally.held[i] >= 33, "{name}: {} of 40", tally.held[i]);
-        // A deviation from 40 draws is known to 1/√78 = 11 %: errors must be right to four of those.
+        // The deviation of 40 draws is known to 1/√78 = 11 %: errors must be right to four of those.
         assert!((0.65..=1.6).contains(&error), "{name}: {error}");
     }
 }

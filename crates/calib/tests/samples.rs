@@ -1,10 +1,10 @@
-//! Slices that are no recording are refused, with the row that is to blame.
+//! Slices that do not form a recording are refused, with the faulty row.
 
 use ohmstrain_calib::{CalibrationError, LawOptions, Samples, SamplesError, fit_law};
 
 const ROWS: usize = 80;
 
-/// A movement with a reading that follows it.
+/// Returns a movement with a reading that follows it.
 fn recording() -> [Vec<f64>; 3] {
     let time_s: Vec<f64> = (0..ROWS).map(|k| 0.1 * k as f64).collect();
     let strain: Vec<f64> = time_s.iter().map(|t| 0.1 - 0.1 * t.cos()).collect();

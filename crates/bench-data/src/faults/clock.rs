@@ -7,7 +7,7 @@ use super::Fault;
 use super::readings::{normal, uniform};
 use crate::trace::Trace;
 
-/// A row's time may come so near its neighbours' times: a share of the step between them.
+/// Largest displacement of a row's time, as a fraction of the step to its neighbour.
 const NEAREST: f64 = 0.45;
 
 /// Changes the times, or the order, of some rows.
@@ -58,7 +58,7 @@ fn jitter(time_s: &mut [f64], rows: Range<usize>, share: f64, random: &mut ChaCh
     }
 }
 
-/// Puts rows of this order into the place of the recording's.
+/// Arranges the rows of the recording in this order.
 fn arrange(trace: &mut Trace, order: &[usize]) {
     fn arranged<T: Clone>(values: &mut Vec<T>, order: &[usize]) {
         *values = order.iter().map(|&row| values[row].clone()).collect();

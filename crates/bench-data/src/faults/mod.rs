@@ -1,8 +1,8 @@
-//! Recordings of sensors, wires, converters and clocks that fail: a fault is put into a recording from a time on, and the
-//! reference keeps the true strain.
+//! Recordings of failing sensors, wires, converters and clocks. A fault starts at a given time of a recording; the reference keeps the true
+//! strain.
 //!
-//! A fault is a kind with its severity; an [`Episode`] adds when it begins, when it ends, and a seed. Readings are changed in
-//! place; an episode of a clock changes times, or adds or moves rows together with their reference.
+//! A fault is a kind with its severity; an [`Episode`] adds its start, its end, and a seed. Readings are changed in place; an episode of a
+//! clock changes times, or duplicates or moves rows together with their reference.
 //!
 //! ```
 //! use ohmstrain_bench_data::faults::{Episode, Fault};
@@ -24,83 +24,83 @@ use crate::trace::Trace;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Fault {
-    /// Readings are missing: this share of them, at random.
+    /// A fraction of the readings, at random, is missing.
     Dropout {
         /// 0 to 1.
         share: f64,
     },
     /// White noise is added.
     Burst {
-        /// Its standard deviation, a share of the least reading.
+        /// Its standard deviation, as a fraction of the smallest reading.
         sd: f64,
     },
-    /// One reading is so many times what it should be.
+    /// One reading is multiplied by a factor.
     Spike {
         /// The factor.
         factor: f64,
     },
-    /// A share of the readings is, at random.
+    /// A fraction of the readings, at random, is multiplied by a factor.
     Spikes {
         /// 0 to 1.
         share: f64,
         /// The factor.
         factor: f64,
     },
-    /// The last good reading comes again and again.
+    /// The last good reading is repeated.
     Stuck,
-    /// Readings above a level stand at that level.
+    /// Readings above a level are clipped to it.
     Saturation {
-        /// The level, a share of the range between the least and the largest reading.
+        /// The level, as a fraction of the range between the smallest and the largest reading.
         share: f64,
     },
-    /// A wire is off: readings far too high.
+    /// A wire is disconnected: readings are far too high.
     UnpluggedHigh {
-        /// Value that is read then, in the readings' unit.
+        /// Value of the readings, in their unit.
         reading: f64,
     },
-    /// A short circuit: readings far too low.
+    /// A short circuit: readings are far too low.
     UnpluggedLow {
-        /// Value that is read then, in the readings' unit.
+        /// Value of the readings, in their unit.
         reading: f64,
     },
     /// Contacts add a resistance.
     BaselineStep {
-        /// A share of the least reading.
+        /// The resistance, as a fraction of the smallest reading.
         share: f64,
     },
-    /// The readings' change over the least one is so many times what it should be.
+    /// The readings' change from the smallest one is multiplied by a factor.
     GainChange {
         /// The factor.
         factor: f64,
     },
-    /// Changes over the least reading have the wrong sign.
+    /// The readings' change from the smallest one has the wrong sign.
     PolarityFlip,
-    /// Times are off, though readings are of the right ones; rows keep their order.
+    /// Times are wrong, while readings are taken at the right ones; rows keep their order.
     Jitter {
-        /// Standard deviation, a share of a step.
+        /// Standard deviation, as a fraction of a step.
         share: f64,
     },
-    /// A share of the rows comes twice, with the same time.
+    /// A fraction of the rows is duplicated, with the same time.
     Duplicated {
         /// 0 to 1.
         share: f64,
     },
-    /// A share of the rows comes after the next one, so that time goes backwards.
+    /// A fraction of the rows is swapped with the next one, so that time goes backwards.
     Late {
         /// 0 to 1.
         share: f64,
     },
-    /// The sensor's resistance at rest is so many times that of the calibration.
+    /// The sensor's resistance at rest is that of the calibration, multiplied by a factor.
     WrongRest {
         /// The factor.
         factor: f64,
     },
-    /// The sensor has slipped: the body's strain is more than the sensor's by this.
+    /// The sensor has slipped: the body's strain exceeds the sensor's.
     Slipped {
         /// Offset, in the reference's unit.
         by: f64,
     },
-    /// The clock runs so many times too fast.
+    /// The clock is fast by a factor.
     WrongRate {
         /// The factor.
         factor: f64,
@@ -108,7 +108,7 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// Its name, without its severity.
+    /// Returns its name, without its severity.
     #[must_use]
     pub const fn name(&self) -> &'static str {
         match self {
@@ -140,14 +140,14 @@ pub struct Episode {
     pub fault: Fault,
     /// Start, s.
     pub from_s: f64,
-    /// End, s; infinite for a fault that stays.
+    /// End, s; infinite for a permanent fault.
     pub until_s: f64,
     /// Equal seeds give equal episodes.
     pub seed: u64,
 }
 
 impl Episode {
-    /// The recording with the fault in it; its times may repeat or go backwards where the fault is of that kind.
+    /// Returns the recording with the fault in it; for some faults, its times repeat or go backwards.
     #[must_use]
     pub fn put_into(&self, trace: &Trace) -> Trace {
         let mut faulty = trace.clone();

@@ -35,7 +35,7 @@ pub(super) fn put_into(values: &mut [f64], rows: Range<usize>, fault: Fault, see
     }
 }
 
-/// Uniform in [0, 1).
+/// Draws a uniform number in [0, 1).
 pub(super) fn uniform(random: &mut ChaCha8Rng) -> f64 {
     StandardUniform.sample(random)
 }

@@ -1,10 +1,10 @@
 use crate::error::{BadContent, Fault};
 
-/// Reason why files do not become a trace. Each is one line.
+/// Reason why files cannot be imported as a trace. Each is one line.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImportError {
-    /// The contents of a file.
+    /// Faulty contents of a file.
     #[error(transparent)]
     Content(#[from] BadContent),
     /// A container that cannot be read.
@@ -15,14 +15,14 @@ pub enum ImportError {
         /// Problem with it.
         what: String,
     },
-    /// Something that the files leave open.
+    /// A question that the files leave open.
     #[error("{file}: {what}; say {}", answers.join(" or "))]
     Question {
         /// Name of the file.
         file: String,
-        /// Question that is open.
+        /// The open question.
         what: String,
-        /// Flags that answer it, as a shell takes them.
+        /// Flags that answer it, quoted for a shell.
         answers: Vec<String>,
     },
 }
@@ -41,7 +41,7 @@ impl ImportError {
     }
 }
 
-/// A word as a POSIX shell takes it.
+/// Quotes a word for a POSIX shell.
 pub(crate) fn quoted(word: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-+=./:,@%".contains(c);
     if !word.is_empty() && word.chars().all(is_plain) {

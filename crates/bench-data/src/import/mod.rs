@@ -11,9 +11,10 @@
 //! # Policy
 //! - No guess is silent: a conclusion from names, units or numbers is in [`Plan::remarks`]; an open question
 //!   is an [`ImportError::Question`], one line that shows how to answer it.
-//! - A plan's own recipe leads to the same plan: `Plan::new(tables, &plan.recipe())` has no question.
-//! - Numbers are read as they are written: powers of ten between units move the decimal mark, so that nothing is rounded
-//!   twice. Cells that no instrument means as a number (`OVLD`, `N/A`, 9.9e37) are missing values, and are counted.
+//! - A plan's own recipe leads to the same plan: `Plan::new(tables, &plan.recipe())` raises no question.
+//! - Numbers are read as they are written: powers of ten between units move the decimal mark, so that nothing is
+//!   rounded twice. Cells that no instrument uses as a number (`OVLD`, `N/A`, 9.9e37) are missing values, and are
+//!   counted.
 //! - The unpacked size of a file, and its repetitions, are bounded (`bounds`), and counted before memory is allocated.
 //! - No function here opens files.
 

@@ -12,13 +12,13 @@ use crate::row::{ReadingKind, ReferenceQuantity};
 use crate::spec::FrontEndSpec;
 use crate::trace::{ConverterReadings, Readings, Reference, Trace};
 
-/// Longest step of the integration, s, whatever the rate of the recording.
+/// Longest integration step, s, at any sampling rate.
 const LONGEST_STEP_S: f64 = 0.01;
 
-/// Simulates a recording: resistance (codes, too, with a front end) and the exact strain, rounded to 1e-5.
+/// Simulates a recording: resistance (and codes, with a front end) and the exact strain, rounded to 1e-5.
 ///
 /// # Errors
-/// Names the setting that no bench can have.
+/// Names the invalid setting.
 pub fn simulate(settings: &SimulationSettings) -> Result<Trace, SettingsError> {
     settings.validate()?;
     let profile = Profile::new(settings, &mut random(settings.seed, Stream::Profile));
@@ -33,7 +33,7 @@ pub fn simulate(settings: &SimulationSettings) -> Result<Trace, SettingsError> {
     let resistance_ohm = disturbed(settings, &profile, rest_ohm, &truth);
     let per_unit = settings.followed.as_ref().map_or(1.0, |followed| followed.strain_per_unit(settings.full_strain()));
     let quantity = settings.followed.as_ref().map_or(ReferenceQuantity::Strain, |followed| followed.pacing.quantity);
-    // As exact as the strain is.
+    // Resolution of the reference: as fine as the strain's.
     let exact = if quantity == ReferenceQuantity::Strain { 1e5 } else { 1e3 };
     Ok(Trace {
         metadata: metadata(settings),
@@ -48,16 +48,16 @@ pub fn simulate(settings: &SimulationSettings) -> Result<Trace, SettingsError> {
     })
 }
 
-/// The sensor at one moment, undisturbed.
+/// State of the sensor at one moment, undisturbed.
 struct Sample {
     time_s: f64,
     strain: f64,
     relative_change: f64,
-    /// Way travelled so far, in units of strain.
+    /// Distance travelled so far, in units of strain.
     travel: f64,
 }
 
-/// Leads the sensor through the profile, sampling at a fixed rate from time zero to the end.
+/// Moves the sensor through the profile, sampling at a fixed rate from time zero to the end.
 fn run(profile: &Profile, rate_hz: f64, sensor: &mut impl StretchedSensor) -> Vec<Sample> {
     let at_rest = Sample { time_s: 0.0, strain: 0.0, relative_change: 0.0, travel: 0.0 };
     let mut samples = vec![at_rest];
@@ -86,7 +86,7 @@ fn run(profile: &Profile, rate_hz: f64, sensor: &mut impl StretchedSensor) -> Ve
     samples
 }
 
-/// Resistance with conditioning, drift and white noise, Ω.
+/// Returns the resistance with conditioning, drift and white noise, Ω.
 fn disturbed(settings: &SimulationSettings, profile: &Profile, rest_ohm: f64, truth: &[Sample]) -> Vec<f64> {
     let disturbances = &settings.disturbances;
     let mut white = random(settings.seed, Stream::White);
@@ -98,7 +98,7 @@ fn disturbed(settings: &SimulationSettings, profile: &Profile, rest_ohm: f64, tr
         let drifted = drift.advance(1.0 / settings.sample_rate_hz, &mut drifting);
         let noise = disturbances.white_sd * normal(&mut white);
         let relative = (1.0 + sample.relative_change) * (1.0 + conditioned) * (1.0 + drifted) + noise;
-        // Noise large enough to make a resistance negative is legal to ask for, a negative resistance is not.
+        // The noise may be set large enough for a negative resistance, but resistances must be positive.
         rest_ohm * relative.max(1e-3)
     };
     truth.iter().map(resistance).collect()
@@ -159,7 +159,7 @@ fn metadata(settings: &SimulationSettings) -> Metadata {
     }
 }
 
-/// Rounds to a decimal resolution, `per_unit` of it to one, so that files hold short numbers.
+/// Rounds to a decimal resolution of `per_unit` steps per unit, so that files hold short numbers.
 fn round(value: f64, per_unit: f64) -> f64 {
     (value * per_unit).round() / per_unit
 }

@@ -4,7 +4,7 @@ use super::noise::{Stream, normal, random};
 
 /// Spread of R₀ between sensors of one make: standard deviation of its logarithm.
 pub(super) const REST_SPREAD: f64 = 0.2;
-/// Spread of a sensor's character between sensors of one make. Illustrative: hand-made sensors of one batch differ by about that much.
+/// Spread of a sensor's character between sensors of one make. Illustrative: hand-made sensors of one batch differ by about this much.
 pub(super) const CHARACTER_SPREAD: f64 = 0.15;
 
 /// One sensor of a make.

@@ -3,7 +3,7 @@ use ohmstrain_model::{Branch, Gauge, SensorLaw, StrainRange};
 use super::Material;
 use super::sensor::{Movement, StretchedSensor};
 
-/// A sensor of the family that is fitted: the switched Kelvin-Voigt law with two branches.
+/// A sensor of the fitted family: the switched Kelvin-Voigt law with two branches.
 pub(super) struct Matched {
     law: SensorLaw<f64, 2>,
     relaxation: [f64; 2],
@@ -16,8 +16,8 @@ impl Matched {
 }
 
 impl StretchedSensor for Matched {
-    /// Exact for constant gains; gains affine in strain are taken at mid-strain, which is of second order in a step
-    /// of at most 10 ms.
+    /// Advances the branches, exactly for constant gains. Gains affine in strain are evaluated at mid-strain, with an
+    /// error of second order in a step of at most 10 ms.
     fn advance(&mut self, movement: &Movement) {
         let (phase, mid_strain) = (movement.phase(), movement.mid_strain());
         for i in 0..self.relaxation.len() {
@@ -33,7 +33,7 @@ impl StretchedSensor for Matched {
     }
 }
 
-/// The illustrative laws: slope and peak of the quasi-static curve, a fast and a slow branch, dash-pot terms.
+/// Returns the illustrative law: slope and peak of the quasi-static curve, a fast and a slow branch, dash-pot terms.
 fn law(material: Material) -> SensorLaw<f64, 2> {
     let (slope, decay_strain, viscosity_s, branches) = match material {
         Material::Ecoflex0030 | Material::Representative => {
@@ -88,7 +88,7 @@ mod tests {
             sensor.advance(&Movement { from_strain: from, to_strain: from + 0.01 * rate, rate, duration_s: 0.01 });
         }
         let closed = |tau: f64, gain: f64| gain * rate * tau * (1.0 - f64::exp(-5.0 / tau));
-        // 500 steps, each rounded a few times at the size of the state: 500 · 4 ε · 0.1 < 1e-13.
+        // There are 500 steps, each with a few roundings of the state: 500 · 4 ε · 0.1 < 1e-13.
         assert!((sensor.relaxation[0] - closed(3.5, 0.75)).abs() < 1e-13);
         assert!((sensor.relaxation[1] - closed(45.0, 0.45)).abs() < 1e-13);
         assert_eq!(Movement { from_strain: 0.1, to_strain: 0.1, rate: 0.0, duration_s: 1.0 }.phase(), Phase::Hold);

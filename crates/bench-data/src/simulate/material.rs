@@ -1,7 +1,8 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// Cross-section of the simulated sensor, mm²: with it, 40 g stretch the softest material to where its resistance turns.
+/// Cross-section of the simulated sensor, mm²; at 40 g the softest material then reaches the strain at which its
+/// resistance turns.
 const CROSS_SECTION_MM2: f64 = 17.5;
 /// Weight of one gram, N.
 const NEWTON_PER_GRAM: f64 = 9.806_65e-3;
@@ -9,9 +10,9 @@ const NEWTON_PER_GRAM: f64 = 9.806_65e-3;
 /// Material of the simulated sensor, with 1:9 carbon black.
 ///
 /// The moduli are the makers'; the electrical parameters are *illustrative*, chosen within these ranges of published
-/// findings: R/R₀ between 1.33 and 1.52 at ε = 0.3, a 290 s hold that loses about a tenth of R with time constants of
-/// some seconds and some tens of seconds, a peak of R at ε ≈ 0.23 at 1 mm/s (Ecoflex 00-30) or ε ≈ 0.12 at 5 mm/s
-/// (Ecoflex 00-50, which relaxes faster, and whose R/R₀ is lower beyond that peak).
+/// findings: R/R₀ between 1.33 and 1.52 at ε = 0.3; a 290 s hold that loses about a tenth of R with time constants of a
+/// few seconds and a few tens of seconds; a peak of R at ε ≈ 0.23 at 1 mm/s (Ecoflex 00-30) or ε ≈ 0.12 at 5 mm/s
+/// (Ecoflex 00-50, which relaxes faster and has a lower R/R₀ beyond that peak).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Material {
     /// Ecoflex 00-30: tensile strength 1.38 MPa, 100 % modulus 0.069 MPa.
@@ -21,15 +22,15 @@ pub enum Material {
     /// VytaFlex 10: 1.38 MPa, 0.21 MPa; electrically much like Ecoflex 00-30.
     Vytaflex10,
     /// Ecoflex 00-30 with less carbon black: with `mismatched`, its error under a static cubic, loop area, release peak
-    /// and slow drift lie within what public recordings of carbon black in silicone and of coated nylon show.
+    /// and slow drift are within the range of public recordings of carbon black in silicone and of coated nylon.
     Representative,
 }
 
 impl Material {
-    /// Materials after published findings.
+    /// Materials based on published findings.
     pub const ALL: [Self; 3] = [Self::Ecoflex0030, Self::Ecoflex0050, Self::Vytaflex10];
 
-    /// The name used in files and flags.
+    /// Returns its name in files and flags.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -40,7 +41,7 @@ impl Material {
         }
     }
 
-    /// Resistance at rest before the first stretch, Ω.
+    /// Returns the resistance at rest before the first stretch, Ω.
     #[must_use]
     pub const fn rest_resistance_ohm(self) -> f64 {
         match self {
@@ -51,7 +52,7 @@ impl Material {
         }
     }
 
-    /// Stress at 100 % strain, MPa.
+    /// Returns the stress at 100 % strain, MPa.
     #[must_use]
     pub const fn modulus_100_mpa(self) -> f64 {
         match self {
@@ -61,7 +62,7 @@ impl Material {
         }
     }
 
-    /// The load that holds the sensor at a strain above -1, g.
+    /// Returns the load that holds the sensor at a strain above -1, g.
     ///
     /// Neo-Hookean solid, engineering stress `μ (λ - λ⁻²)` with λ = 1 + ε and μ from the 100 % modulus (Treloar, *The
     /// Physics of Rubber Elasticity*), times the sensor's cross-section.
@@ -72,7 +73,7 @@ impl Material {
         shear_mpa * (stretch - stretch.powi(-2)) * CROSS_SECTION_MM2 / NEWTON_PER_GRAM
     }
 
-    /// The strain under a load of `load_g ≥ 0` grams: the inverse of [`load_g`](Self::load_g).
+    /// Returns the strain under a load of `load_g ≥ 0` grams: the inverse of [`load_g`](Self::load_g).
     #[must_use]
     pub fn strain_under_load(self, load_g: f64) -> f64 {
         // The load grows by at least μ per unit of stretch, so Newton's method from above converges monotonically.
@@ -93,7 +94,7 @@ impl fmt::Display for Material {
     }
 }
 
-/// No simulated material has this name.
+/// Error for a name that is not a simulated material's.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no material `{0}`: expected ecoflex-00-30, ecoflex-00-50, vytaflex-10 or representative")]
 pub struct UnknownMaterial(String);

@@ -7,13 +7,13 @@ use super::sensor::{Movement, StretchedSensor};
 const BRANCHES: usize = 9;
 const PLAYS: usize = 3;
 
-/// The fastest of the time constants, s, which are log-spaced.
+/// Fastest of the log-spaced time constants, s.
 const FASTEST_S: f64 = 0.4;
-/// Branches are driven by |v|^0.9, in units of this rate, 1/s: gains depend on speed.
+/// Power of the rate that drives the branches, |v|^0.9, so that gains depend on speed, and unit of that rate, 1/s.
 const DRIVE_POWER: f64 = 0.9;
 const DRIVE_RATE: f64 = 0.1;
-/// Broken paths cannot break again: the drive fades as the relaxing share nears this ceiling, so that cycling settles
-/// into a band instead of climbing for ever.
+/// Ceiling of the relaxing resistance: broken paths cannot break again, so the drive fades near it, and cycling settles into a band instead
+/// of climbing for ever.
 const CEILING: f64 = 2.0;
 /// Half-widths of the play operators.
 const PLAY_STRAINS: [f64; PLAYS] = [0.01, 0.03, 0.08];
@@ -29,17 +29,17 @@ struct Character {
     /// Factor on all time constants, and the slowest of them before that, s.
     time_scale: f64,
     slowest_s: f64,
-    /// Weights of the branches go as τ to this power: with -0.22 they relax together much like a stretched exponential.
+    /// Power of τ to which the weights of the branches are proportional: with -0.22 their sum relaxes much like a stretched exponential.
     spectrum: f64,
-    /// Factor on all that breaks conducting paths.
+    /// Factor on the rate at which conducting paths break.
     breaking: f64,
     /// Common weight of the play operators.
     play_weight: f64,
-    /// Resistance that the largest strain so far leaves behind for good.
+    /// Permanent resistance per unit of the largest strain so far.
     memory_per_strain: f64,
 }
 
-/// Made after 10 wt-% carbon black.
+/// Modelled on 10 wt-% carbon black.
 const STRONG: Character = Character {
     gauge_slope: 3.3,
     gauge_peak: 0.20,
@@ -70,7 +70,7 @@ impl Character {
         }
     }
 
-    /// One sensor of this make.
+    /// Draws one sensor of this make.
     fn drawn(self, individual: &mut Individual) -> Self {
         let mut drawn = |of_make: f64| of_make * individual.factor(CHARACTER_SPREAD);
         Self {
@@ -85,8 +85,8 @@ impl Character {
     }
 }
 
-/// A sensor outside of the family that is fitted: nine branches with gains that are not affine in strain and a drive
-/// that is not linear in speed and saturates, hysteresis without a time constant (play operators), and a memory of the largest strain.
+/// A sensor outside the fitted family: nine branches with gains that are not affine in strain, and a drive that is not linear in speed and
+/// saturates; hysteresis without a time constant (play operators); and a memory of the largest strain.
 pub(super) struct Mismatched {
     character: Character,
     tau_s: [f64; BRANCHES],
@@ -117,14 +117,14 @@ impl Mismatched {
 }
 
 impl Mismatched {
-    /// Drive of the branches, 1/s, with the branches where they are.
+    /// Returns the drive of the branches, 1/s, at their present state.
     fn drive(&self, movement: &Movement, relaxation: &[f64; BRANCHES]) -> f64 {
         let left_to_break = (1.0 - relaxation.iter().sum::<f64>() / CEILING).max(0.0);
         let gain = self.character.breaking * left_to_break * gain(movement.mid_strain(), movement.phase());
         gain * (movement.rate.abs() / DRIVE_RATE).powf(DRIVE_POWER) * DRIVE_RATE
     }
 
-    /// The branches after a share of the movement under a constant drive.
+    /// Returns the branches after a fraction of the movement under a constant drive.
     fn relaxed(&self, movement: &Movement, share: f64, drive: f64) -> [f64; BRANCHES] {
         std::array::from_fn(|i| {
             let gone = -(-share * movement.duration_s / self.tau_s[i]).exp_m1();
@@ -135,7 +135,7 @@ impl Mismatched {
 
 impl StretchedSensor for Mismatched {
     fn advance(&mut self, movement: &Movement) {
-        // The drive fades with what it has driven: evaluate it in the middle of the step, which is of second order.
+        // The drive fades with the state: it is evaluated in the middle of the step, with an error of second order.
         let half = self.relaxed(movement, 0.5, self.drive(movement, &self.relaxation));
         self.relaxation = self.relaxed(movement, 1.0, self.drive(movement, &half));
         for (play, half_width) in self.play.iter_mut().zip(PLAY_STRAINS) {
@@ -154,8 +154,8 @@ impl StretchedSensor for Mismatched {
     }
 }
 
-/// Returns the rate at which movement breaks conducting paths, per unit of strain: releasing from a large strain breaks most, which
-/// makes the peak on the way back.
+/// Returns the rate at which movement breaks conducting paths, per unit of strain: releasing from a large strain breaks most, which causes
+/// the peak on release.
 fn gain(strain: f64, phase: Phase) -> f64 {
     match phase {
         Phase::Extend => 1.7 * (-strain / 0.25).exp() + 0.3,

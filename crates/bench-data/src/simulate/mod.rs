@@ -1,12 +1,11 @@
-//! Recordings of a simulated bench, after the protocols of the published work on carbon-black/silicone sensors.
+//! Recordings of a simulated bench, based on the protocols of the published work on carbon-black/silicone sensors.
 //!
-//! A sensor 30 mm long is stretched by a machine that knows its strain exactly (to 1e-5). The three materials are
-//! *illustrative*: no table of fitted parameters is available for them, so theirs are chosen to show what was published
-//! about each, see [`Material`]. The sensor follows the switched Kelvin-Voigt law with two branches, the family that is
-//! fitted elsewhere, or, `mismatched`, deliberately none of that family: whoever judges a filter on data from the
-//! filter's own law learns little. The mismatched sensor is made after measured 10 wt-% carbon-black silicone, whose R
-//! rises to 1.58 to 1.65 R₀ at a strain of 0.06 to 0.18 on the way back, higher at higher speed, and keeps 6 to 13 % of
-//! R₀ after 290 s at rest.
+//! A sensor 30 mm long is stretched by a machine whose strain is known exactly (to 1e-5). The three materials are *illustrative*: no table
+//! of fitted parameters is available for them, so theirs are chosen to reproduce the published findings about each, see [`Material`]. The
+//! sensor follows the switched Kelvin-Voigt law with two branches, the family that is fitted elsewhere, or, with `mismatched`, deliberately
+//! a law outside that family, because judging a filter on data from its own law shows little. The mismatched sensor is modelled on measured
+//! 10 wt-% carbon-black silicone, whose R rises to 1.58 to 1.65 R₀ at a strain of 0.06 to 0.18 on release, higher at higher speed, and
+//! keeps 6 to 13 % of R₀ after 290 s at rest.
 //!
 //! ```
 //! use ohmstrain_bench_data::simulate::{Material, Protocol, SimulationSettings, simulate};

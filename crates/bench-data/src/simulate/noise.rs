@@ -4,21 +4,21 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::settings::{SettingsError, within};
 
-/// Disturbances of the reading besides the sensor's own behaviour.
+/// Disturbances of the reading beyond the sensor's own behaviour.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disturbances {
-    /// Standard deviation of the white noise, share of R₀; usually 2e-4.
+    /// Standard deviation of the white noise, as a fraction of R₀; usually 2e-4.
     pub white_sd: f64,
     /// Power spectral density of the 1/f drift of R at 1 Hz, 1/Hz, relative to R; usually 1e-8.
     pub drift_density: f64,
-    /// True if the first cycles lower the resistance for good: by 1.9, 1.5, 1.0 and 0.3 %.
+    /// True if the first cycles permanently lower the resistance, by 1.9, 1.5, 1.0 and 0.3 %.
     pub conditioning: bool,
 }
 
 impl Disturbances {
     /// Disturbances measured on a bench.
     pub const BENCH: Self = Self { white_sd: 2e-4, drift_density: 1e-8, conditioning: true };
-    /// Nothing at all.
+    /// No disturbances.
     pub const NONE: Self = Self { white_sd: 0.0, drift_density: 0.0, conditioning: false };
 
     pub(super) fn validate(&self) -> Result<(), SettingsError> {
@@ -27,14 +27,14 @@ impl Disturbances {
     }
 }
 
-/// Processes per decade of frequency: two keep the sum within 3 % of 1/f.
+/// Number of processes per decade of frequency: two keep the sum within 3 % of 1/f.
 const PER_DECADE: i32 = 2;
-/// Time constants, s, as powers of ten: 0.01 s to 10 000 s.
+/// Range of time constants, s, as powers of ten: 0.01 s to 10 000 s.
 const DECADES: std::ops::RangeInclusive<i32> = -2..=4;
 
-/// Drift with a spectrum of 1/f: a sum of Ornstein-Uhlenbeck processes with log-spaced time constants.
+/// Drift with a 1/f spectrum: a sum of Ornstein-Uhlenbeck processes with log-spaced time constants.
 ///
-/// Each has the power that 1/f has in its share of a decade, so that no long record needs to be filtered at once.
+/// Each has the power of 1/f in its part of a decade, so no long record has to be filtered at once.
 pub(super) struct Drift {
     processes: Vec<Process>,
 }
@@ -57,7 +57,7 @@ impl Drift {
         Self { processes }
     }
 
-    /// The drift `step_s` later.
+    /// Advances by `step_s`, s, and returns the drift.
     pub(super) fn advance(&mut self, step_s: f64, random: &mut ChaCha8Rng) -> f64 {
         for process in &mut self.processes {
             let kept = (-step_s / process.tau_s).exp();
@@ -68,7 +68,7 @@ impl Drift {
     }
 }
 
-/// Independent random numbers for each use, so that switching one off leaves the others as they are.
+/// Independent random numbers for each purpose, so that switching one off leaves the others unchanged.
 #[derive(Clone, Copy)]
 pub(super) enum Stream {
     Profile = 1,
@@ -88,10 +88,10 @@ pub(super) fn normal(random: &mut ChaCha8Rng) -> f64 {
     StandardNormal.sample(random)
 }
 
-/// Permanent change by the cycles, relative to R, after each of them.
+/// Permanent change after each cycle, relative to R.
 const CONDITIONED: [f64; 5] = [0.0, -0.019, -0.034, -0.044, -0.047];
 
-/// The change after a number of full cycles, between which it goes in straight lines.
+/// Returns the change after a number of full cycles, interpolated linearly.
 pub(super) fn conditioning(cycles: f64) -> f64 {
     let last = CONDITIONED.len() - 1;
     let done = (cycles.floor() as usize).min(last);
@@ -111,7 +111,7 @@ mod tests {
         assert_eq!(conditioning(100.0), -0.047);
     }
 
-    /// The variance of differences of averages over a second is `2 ln 2 · density` for 1/f noise (Allan variance
+    /// For 1/f noise, the variance of differences of averages over a second is `2 ln 2 · density` (Allan variance
     /// `2 ln 2 · h` is half the mean square difference), at any averaging time.
     #[test]
     fn drift_has_the_density_asked_for() {

@@ -1,4 +1,4 @@
-//! A person who follows a protocol, more or less.
+//! A person who follows a protocol imperfectly.
 
 use std::fmt;
 use std::str::FromStr;
@@ -13,29 +13,29 @@ use crate::pacing::Pacing;
 use crate::row::ReferenceQuantity;
 use crate::spec::Pairs;
 
-/// Time in which a cue is acted upon, s.
+/// Shortest and longest reaction time to a cue, s.
 const REACTION_S: (f64, f64) = (0.15, 0.6);
 /// Shortest and longest move, as multiples of the protocol's.
 const PACE: (f64, f64) = (0.8, 1.25);
-/// Standard deviation of how far a move goes beyond its end, as a share of it, and the time that takes to mend, s.
+/// Standard deviation of the overshoot of a move, as a fraction of its distance, and the time to correct it, s.
 const OVERSHOOT: f64 = 0.04;
 const MENDED_S: f64 = 0.4;
-/// Largest advance or delay within a move, as a share of its time.
+/// Largest advance or delay within a move, as a fraction of its duration.
 const UNEVEN: f64 = 0.12;
-/// Knots of a move.
+/// Number of knots of a move.
 const KNOTS: usize = 24;
-/// Share of a hold that is left out where it is cut short.
+/// Fraction by which a hold is cut short, if it is.
 const CUT: (f64, f64) = (0.2, 0.5);
 
 /// Faults of a person who follows a protocol: `mark_sd=0.02 missed=0 cut_short=0`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Person {
-    /// Standard deviation of a position from the protocol's, as a share of the span of all; half of its variance is the same at every
-    /// visit of the position.
+    /// Standard deviation of a position from the protocol's, as a fraction of the span of all positions; half of its variance is the same
+    /// at every visit of the position.
     pub mark_sd: f64,
-    /// Share of the steps that are not made.
+    /// Fraction of the steps that are missed.
     pub missed: f64,
-    /// Share of the holds that end early.
+    /// Fraction of the holds that end early.
     pub cut_short: f64,
 }
 
@@ -80,14 +80,14 @@ impl Person {
 pub struct Followed {
     /// The protocol.
     pub pacing: Pacing,
-    /// Place of the joint among those of the protocol; 0 if it has one value for all.
+    /// Index of the joint in the protocol; 0 if the protocol has one value for all.
     pub joint: usize,
     /// The person.
     pub person: Person,
 }
 
 impl Followed {
-    /// Refuses strains that the simulated sensor does not reach.
+    /// Refuses strains that the simulated sensor cannot reach.
     pub(super) fn validate(&self) -> Result<(), SettingsError> {
         self.person.validate()?;
         within("steps of the protocol", self.pacing.steps.len() as f64, 1.0, 1e4)?;
@@ -103,7 +103,8 @@ impl Followed {
         values.get(self.joint).copied().unwrap_or(f64::NAN)
     }
 
-    /// Strain per unit of the protocol: 1, or that of an angle whose largest stretches the sensor by `full_strain`.
+    /// Returns the strain per unit of the protocol: 1, or for angles the value at which the largest one stretches the sensor by
+    /// `full_strain`.
     pub(super) fn strain_per_unit(&self, full_strain: f64) -> f64 {
         let values = self.pacing.positions.iter().map(|position| self.value(&position.values));
         match self.pacing.quantity {
@@ -112,14 +113,14 @@ impl Followed {
         }
     }
 
-    /// Strain of the person over time.
+    /// Returns the person's strain over time.
     pub(super) fn profile(&self, full_strain: f64, random: &mut ChaCha8Rng) -> Profile {
         let factor = self.strain_per_unit(full_strain);
         let nominal: Vec<f64> =
             self.pacing.positions.iter().map(|position| factor * self.value(&position.values)).collect();
         let span = nominal.iter().copied().fold(0.0, f64::max) - nominal.iter().copied().fold(f64::INFINITY, f64::min);
         let spread = self.person.mark_sd * span * 0.5_f64.sqrt();
-        // A sensor is not compressed.
+        // A sensor cannot be compressed.
         let off = |value: f64, random: &mut ChaCha8Rng| (value + spread * normal(random)).max(0.0);
         let own: Vec<f64> = nominal.iter().map(|value| off(*value, random)).collect();
         let (mut begun_s, mut place) = (0.0, 0.0);
@@ -138,7 +139,7 @@ impl Followed {
                 place = goal;
             } else if !is_missed && step.move_s > 0.0 {
                 let (from, duration_s) = (place, pace * step.move_s);
-                // A hold that was cut short has ended before this step's cue.
+                // If the previous hold was cut short, it has ended before this step's cue.
                 profile.until(begun_s + reaction_s);
                 let reached = (goal + overshoot * (goal - from)).max(0.0);
                 let start_s = profile.duration_s();
@@ -151,7 +152,7 @@ impl Followed {
                 place = goal;
             }
             if cut > 0.0 && k > 0 {
-                // Halfway back to where the body was before, for the rest of the hold.
+                // Halfway back to the previous position, for the rest of the hold.
                 profile.until(end_s - cut * step.hold_s);
                 let before = own[self.pacing.steps[k - 1].to];
                 place = 0.5 * (place + before);
@@ -164,7 +165,7 @@ impl Followed {
     }
 }
 
-/// Progress of a move at the share `u` of its time, 0 to 1. Source: Flash and Hogan, *J. Neurosci.* 5 (1985) 1688.
+/// Returns the progress of a move, 0 to 1, at the fraction `u` of its time. Source: Flash and Hogan, *J. Neurosci.* 5 (1985) 1688.
 fn minimum_jerk(u: f64) -> f64 {
     let u = u.clamp(0.0, 1.0);
     u.powi(3) * (10.0 + u * (6.0 * u - 15.0))

@@ -4,7 +4,7 @@ use rand_distr::{Distribution, Uniform};
 use super::protocol::LEAD_IN_S;
 use super::{Protocol, SimulationSettings};
 
-/// Strain over time as straight lines between knots.
+/// Strain over time, linear between knots.
 pub(super) struct Profile {
     time_s: Vec<f64>,
     strain: Vec<f64>,
@@ -59,12 +59,12 @@ impl Profile {
         profile
     }
 
-    /// A body at a strain, at time zero.
+    /// Starts at a strain, at time zero.
     pub(super) fn at(strain: f64) -> Self {
         Self { time_s: vec![0.0], strain: vec![strain] }
     }
 
-    /// Appends a straight line to a strain; a time that is past is passed over.
+    /// Appends a straight line to a strain; a time in the past is ignored.
     pub(super) fn line_to(&mut self, time_s: f64, strain: f64) {
         if time_s > self.duration_s() {
             self.time_s.push(time_s);
@@ -111,7 +111,7 @@ impl Profile {
         }
     }
 
-    /// Blocks in fixed turn, so that each half of the recording has some of every kind; sizes and speeds at random.
+    /// Appends blocks in a fixed order, so that each half of the recording has some of every kind, with random sizes and speeds.
     fn mixed(&mut self, full: f64, fastest: f64, duration_s: f64, random: &mut ChaCha8Rng) {
         let mut draw = |low: f64, high: f64| low + (high - low) * unit(random);
         for speed_share in [0.2, 1.0, 0.5].into_iter().cycle() {
@@ -146,8 +146,8 @@ impl Profile {
     }
 }
 
-/// Uniform in [0, 1).
+/// Draws a uniform number in [0, 1).
 pub(super) fn unit(random: &mut ChaCha8Rng) -> f64 {
-    // The bounds are constants and in order, so that there is always a distribution; its middle is a safe stand-in.
+    // The bounds are ordered constants, so the distribution always exists; its mean is a safe fallback.
     Uniform::new(0.0, 1.0).map_or(0.5, |uniform| uniform.sample(random))
 }

@@ -8,7 +8,7 @@ pub(super) const LEAD_IN_S: f64 = 2.0;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Protocol {
-    /// Stretch and release, again and again.
+    /// Repeated stretch and release.
     ExtendRetract {
         /// Number of cycles, at least one.
         cycles: u32,
@@ -31,7 +31,7 @@ pub enum Protocol {
         /// Time at each load, s.
         hold_s: f64,
     },
-    /// Stretch, hold for long, release, rest: the first time to full stretch, then to random strains at random speeds.
+    /// Stretch, long hold, release, rest: first to full stretch, then to random strains at random speeds.
     LongHolds {
         /// Number of repetitions, at least one.
         cycles: u32,
@@ -40,7 +40,8 @@ pub enum Protocol {
         /// Longest time at rest after a release, s; the shortest is a fifth of it.
         rest_s: f64,
     },
-    /// Triangles at several speeds, holds at several strains and a random walk, in turn: what a calibration should see.
+    /// Triangles at several speeds, holds at several strains and a random walk, in turn: the contents of a good
+    /// calibration.
     Mixed {
         /// Duration, s.
         duration_s: f64,
@@ -62,7 +63,7 @@ impl Protocol {
     /// The heaviest load of the load steps, g.
     pub const HEAVIEST_LOAD_G: f64 = 75.0;
 
-    /// The name used in files and flags.
+    /// Returns its name in files and flags.
     #[must_use]
     pub const fn name(&self) -> &'static str {
         match self {
@@ -81,12 +82,12 @@ impl fmt::Display for Protocol {
     }
 }
 
-/// No protocol has this name.
+/// Error for a name that is not a protocol's.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no protocol `{0}`: expected extend-retract, extend-hold, load-steps, long-holds or mixed")]
 pub struct UnknownProtocol(String);
 
-/// The protocol of that name with its usual counts and times.
+/// Returns the protocol of that name with its usual counts and times.
 impl FromStr for Protocol {
     type Err = UnknownProtocol;
 

@@ -28,6 +28,6 @@ pub(super) trait StretchedSensor {
     /// Moves the sensor through a movement.
     fn advance(&mut self, movement: &Movement);
 
-    /// R/R₀ - 1 at the end of the movement it went through last.
+    /// Returns R/R₀ - 1 at the end of `movement`, the last one.
     fn relative_change(&self, movement: &Movement) -> f64;
 }

@@ -1,7 +1,7 @@
 use super::{Disturbances, Followed, GAUGE_LENGTH_MM, Material, Protocol};
 use crate::spec::FrontEndSpec;
 
-/// Longest simulated recording, rows: a slip of a digit must not fill the memory.
+/// Largest number of rows in a simulated recording: a typing error must not fill the memory.
 const MOST_ROWS: f64 = 1e7;
 
 /// Settings of a simulation.
@@ -15,26 +15,25 @@ pub struct SimulationSettings {
     pub followed: Option<Followed>,
     /// Full stretch, mm on 30 mm, above 0 and at most 15; default 10.
     pub elongation_mm: f64,
-    /// Speed of the machine, mm/s, 0.01 to 100; default 1. In [`Protocol::LongHolds`] and [`Protocol::Mixed`] the
-    /// fastest.
+    /// Speed of the machine, mm/s, 0.01 to 100; default 1. The largest speed in [`Protocol::LongHolds`] and [`Protocol::Mixed`].
     pub speed_mm_s: f64,
     /// Readings per second, 0.1 to 10 000; default 20.
     pub sample_rate_hz: f64,
-    /// True if the sensor follows a law outside of the family that is fitted; default false.
+    /// True if the sensor follows a law outside the fitted family; default false.
     pub mismatched: bool,
     /// Disturbances of the reading; default all of them.
     pub disturbances: Disturbances,
-    /// The electronics that turn the resistance into codes; default none: the resistance itself is recorded.
+    /// The electronics that convert the resistance to codes; default none: the resistance itself is recorded.
     pub front_end: Option<FrontEndSpec>,
     /// Equal seeds give equal recordings; default 1.
     pub seed: u64,
-    /// Number of the sensor within the make, a seed too: its R₀ and, with `mismatched`, its character are drawn around the make's;
-    /// default `None`, the make's own.
+    /// Number of the sensor within the make, also a seed: its R₀ and, with `mismatched`, its character are drawn around those of the make;
+    /// default `None`, the make's own values.
     pub individual: Option<u64>,
 }
 
 impl SimulationSettings {
-    /// Defaults for a material and a protocol.
+    /// Returns the defaults for a material and a protocol.
     #[must_use]
     pub const fn new(material: Material, protocol: Protocol) -> Self {
         Self {
@@ -52,7 +51,7 @@ impl SimulationSettings {
         }
     }
 
-    /// The example: a sensor outside the family of laws that is fitted, stretched by up to 10 mm at up to 5 mm/s.
+    /// Returns the settings of the example: a sensor outside the fitted family of laws, stretched by up to 10 mm at up to 5 mm/s.
     #[must_use]
     pub fn example() -> Self {
         Self { speed_mm_s: 5.0, mismatched: true, ..Self::new(Material::Representative, Protocol::MIXED) }
@@ -61,7 +60,7 @@ impl SimulationSettings {
     /// Checks every setting.
     ///
     /// # Errors
-    /// Names the setting, its range and what was found.
+    /// Names the setting, its range and the value found.
     pub fn validate(&self) -> Result<(), SettingsError> {
         within("elongation_mm", self.elongation_mm, 1e-3, 15.0)?;
         within("speed_mm_s", self.speed_mm_s, 0.01, 100.0)?;
@@ -91,7 +90,7 @@ impl SimulationSettings {
         }
     }
 
-    /// Refuses recordings that no memory holds.
+    /// Refuses recordings that do not fit into memory.
     pub(super) fn check_rows(&self, duration_s: f64) -> Result<(), SettingsError> {
         within("number of rows", duration_s * self.sample_rate_hz, 0.0, MOST_ROWS)
     }
@@ -105,7 +104,7 @@ impl SimulationSettings {
     }
 }
 
-/// Settings that no bench can have.
+/// Error for invalid settings.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SettingsError {
@@ -121,7 +120,7 @@ pub enum SettingsError {
         /// Value of the setting.
         found: f64,
     },
-    /// A front end that cannot be.
+    /// An invalid front end.
     #[error("front_end: {0}")]
     FrontEnd(String),
 }

@@ -1,8 +1,8 @@
-//! Measures of what a simulated sensor does, taken from its recordings as a person at the bench would take them.
+//! Quantities of a simulated sensor, measured on its recordings as on a real bench.
 
 use ohmstrain_bench_data::simulate::{Disturbances, Material, Protocol, SimulationSettings, simulate};
 
-/// A bench without disturbances, so that a finding is a property of the sensor.
+/// A bench without disturbances, so that findings are properties of the sensor.
 #[derive(Clone, Copy)]
 pub struct Bench {
     pub material: Material,
@@ -35,8 +35,8 @@ impl Bench {
         }
     }
 
-    /// Area of an extend-retract loop in the plane of ε/ε_max and R/R₀: the mean gap between its two branches, for the
-    /// first and for the sixth cycle.
+    /// Returns the area of an extend-retract loop in the plane of ε/ε_max and R/R₀, which is the mean gap between its
+    /// two branches, for the first and the sixth cycle.
     pub fn loop_areas(self, elongation_mm: f64, speed_mm_s: f64) -> [f64; 2] {
         let curve = self.record(Protocol::ExtendRetract { cycles: 6, rest_s: 0.0 }, elongation_mm, speed_mm_s);
         let ramp_s = elongation_mm / speed_mm_s;
@@ -47,13 +47,13 @@ impl Bench {
         })
     }
 
-    /// The highest R/R₀ of a first ramp to 10 mm, and its strain.
+    /// Returns the highest R/R₀ of a first ramp to 10 mm, and its strain.
     pub fn ramp_peak(self, speed_mm_s: f64) -> (f64, f64) {
         let curve = self.record(Protocol::ExtendRetract { cycles: 1, rest_s: 0.0 }, 10.0, speed_mm_s);
         curve.peak(2.0..2.0 + 10.0 / speed_mm_s)
     }
 
-    /// A ramp to 10 mm, a hold of 290 s, a release and a rest of 290 s.
+    /// Simulates a ramp to 10 mm, a hold of 290 s, a release and a rest of 290 s.
     pub fn long_hold(self, speed_mm_s: f64) -> LongHold {
         let curve = self.record(Protocol::ExtendHold { cycles: 1, hold_s: 290.0, rest_s: 290.0 }, 10.0, speed_mm_s);
         let ramp_s = 10.0 / speed_mm_s;
@@ -69,12 +69,12 @@ pub struct LongHold {
 }
 
 impl LongHold {
-    /// Share of R that is lost within `after_s` seconds of the hold.
+    /// Returns the fraction of R that is lost within `after_s` seconds of the hold.
     pub fn lost(&self, after_s: f64) -> f64 {
         1.0 - self.curve.at(self.start_s + after_s) / self.curve.at(self.start_s)
     }
 
-    /// The highest R/R₀ of the release, and its strain.
+    /// Returns the highest R/R₀ of the release, and its strain.
     pub fn release_peak(&self) -> (f64, f64) {
         self.curve.peak(self.start_s + 290.0..self.start_s + 290.0 + self.ramp_s)
     }
@@ -86,14 +86,14 @@ impl LongHold {
 }
 
 impl Curve {
-    /// R/R₀ at a time, between two samples on a straight line.
+    /// Returns R/R₀ at a time, interpolated linearly.
     pub fn at(&self, time_s: f64) -> f64 {
         let next = self.time_s.partition_point(|time| *time < time_s).clamp(1, self.time_s.len() - 1);
         let share = (time_s - self.time_s[next - 1]) / (self.time_s[next] - self.time_s[next - 1]);
         self.ratio[next - 1] + share * (self.ratio[next] - self.ratio[next - 1])
     }
 
-    /// The highest R/R₀ within a time span, and its strain.
+    /// Returns the highest R/R₀ within a time span, and its strain.
     pub fn peak(&self, span_s: std::ops::Range<f64>) -> (f64, f64) {
         (0..self.time_s.len())
             .filter(|i| span_s.contains(&self.time_s[*i]))

@@ -5,24 +5,25 @@ use super::sampling_interval_s;
 use crate::CalibrationError;
 use crate::samples::Samples;
 
-/// The readings of the last 20 s on a uniform grid: a filter of finite impulse response.
+/// Readings of the last 20 s on a uniform grid: a finite impulse response filter.
 ///
-/// Between readings it interpolates linearly; before the first one it takes the first one.
+/// Readings are interpolated linearly onto the grid; times before the first reading take its value.
 #[derive(Clone, Debug)]
 pub struct Fir {
     spacing_s: f64,
     taps: usize,
-    /// Times and readings of the window, and one before it.
+    /// Times and readings in the window, and the last one before it.
     recent: VecDeque<(f64, f64)>,
 }
 
 /// Length of the window of readings, s.
 const WINDOW_S: f64 = 20.0;
-/// Most readings on the grid.
+/// Largest number of readings on the grid.
 const MOST_TAPS: usize = 40;
 
 impl Fir {
-    /// Ridge regression of strain. The grid is half a second wide, or as wide as the readings are apart.
+    /// Fits a ridge regression of strain. The grid spacing is half a second, or the sampling interval if that is
+    /// longer.
     ///
     /// # Errors
     /// If a recording is too short, the strain is constant or the readings do not vary.
@@ -32,13 +33,13 @@ impl Fir {
         Regression::fit(recordings, [Self { spacing_s, taps, recent: VecDeque::new() }], 1, &BASELINE_RIDGES)
     }
 
-    /// Seconds from one reading of the grid to the next.
+    /// Returns the spacing of the grid, s.
     #[must_use]
     pub const fn spacing_s(&self) -> f64 {
         self.spacing_s
     }
 
-    /// Readings on the grid, the present one included.
+    /// Returns the number of readings on the grid, the present one included.
     #[must_use]
     pub const fn taps(&self) -> usize {
         self.taps

@@ -3,10 +3,10 @@ use crate::CalibrationError;
 use crate::low_pass::LowPass;
 use crate::samples::Samples;
 
-/// The reading, its distances from four low-passes of it, and all products of two of them.
+/// The reading, its differences from four low-passes of it, and all products of two of them.
 ///
-/// Distances span the same as the low-passes themselves, and are much less alike: the ridge penalises what each low-pass
-/// adds, not what all have in common.
+/// The differences span the same space as the low-passes but are much less alike, so the ridge penalises what each
+/// low-pass adds, not what they share.
 #[derive(Clone, Debug)]
 pub struct LeakyBank([LowPass; TIME_CONSTANTS_S.len()]);
 
@@ -14,7 +14,7 @@ pub struct LeakyBank([LowPass; TIME_CONSTANTS_S.len()]);
 const TIME_CONSTANTS_S: [f64; 4] = [0.5, 2.0, 8.0, 32.0];
 
 impl LeakyBank {
-    /// Ridge regression of strain.
+    /// Fits a ridge regression of strain.
     ///
     /// # Errors
     /// If a recording is too short, the strain is constant or the readings do not vary.
@@ -30,7 +30,7 @@ impl Features for LeakyBank {
     }
 }
 
-/// The constant, the linear regressors and the products of any two of them.
+/// Returns the constant, the linear regressors and the products of any two of them.
 fn with_products(linear: &[f64]) -> Vec<f64> {
     let mut regressors = vec![1.0];
     regressors.extend(linear);

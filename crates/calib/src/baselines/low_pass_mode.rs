@@ -4,20 +4,20 @@ use crate::CalibrationError;
 use crate::low_pass::LowPass;
 use crate::samples::Samples;
 
-/// The reading, squared and cubed, and its distance from one low-pass of it: a static cubic that knows one relaxation.
+/// The reading, its square and cube, and its difference from one low-pass of it: a static cubic with one relaxation.
 #[derive(Clone, Debug)]
 pub struct LowPassMode {
     low_pass: LowPass,
 }
 
-/// Time constants tried, evenly spaced in their logarithm: neighbours differ by a quarter where they span two decades.
+/// Number of time constants tried, evenly spaced in their logarithm; over two decades, neighbours differ by a quarter.
 const TIME_CONSTANTS: usize = 24;
-/// The constant and four features: few enough to do without a ridge.
+/// Number of features: the constant and four others, few enough to need no ridge.
 const FEATURES: usize = 5;
 
 impl LowPassMode {
-    /// Least squares; the time constant, from three readings to a quarter of the longest recording, which is a block of
-    /// the cross-validation, is the one with the least error there.
+    /// Fits by least squares. The time constant is the one with the least cross-validation error, between three
+    /// sampling intervals and a quarter of the longest recording, which is the length of a cross-validation block.
     ///
     /// # Errors
     /// If a recording is too short, the strain is constant or the readings do not vary.
@@ -34,7 +34,7 @@ impl LowPassMode {
         Regression::fit(recordings, candidates, FEATURES, &[0.0])
     }
 
-    /// The time constant, s.
+    /// Returns the time constant, s.
     #[must_use]
     pub const fn tau_s(&self) -> f64 {
         self.low_pass.tau_s()

@@ -26,17 +26,17 @@ use crate::order::median;
 use crate::samples::Samples;
 use ohmstrain_sensor::{RangeParams, StaticCubic};
 
-/// An inverse at work on one recording.
+/// Inverse running on one recording.
 pub trait Baseline {
-    /// Strain at `time_s` from this reading and those before, within the range it was fitted on. A missing reading (NaN)
-    /// keeps the last value; before the first reading that is the middle of the range. Times increase.
+    /// Returns the strain at `time_s` from this reading and those before, within the range of the fit. A missing
+    /// reading (NaN) keeps the last value; before the first reading that is the middle of the range. Times increase.
     fn strain(&mut self, time_s: f64, reading: f64) -> f64;
 }
 
-/// All of them, fitted to the same rows.
+/// All four regressions, fitted to the same rows.
 #[derive(Clone, Debug)]
 pub struct Baselines {
-    /// Cubic polynomial of the reading.
+    /// Cubic polynomial in the reading.
     pub static_cubic: StaticCubic,
     /// The readings of the last 20 s.
     pub fir: Regression<Fir>,
@@ -62,7 +62,7 @@ impl Baselines {
     }
 }
 
-/// Clips estimates to a range and keeps the last one where there is none.
+/// Last estimate, clipped to a range; kept while there is no new one.
 #[derive(Clone, Copy, Debug)]
 struct Held {
     range: RangeParams,
@@ -82,7 +82,7 @@ impl Held {
     }
 }
 
-/// Largest of the recordings' median steps, s: what all of them can resolve.
+/// Returns the largest of the recordings' median sampling intervals, s, which all of them can resolve.
 fn sampling_interval_s(recordings: &[Samples]) -> f64 {
     let step = |samples: &Samples| median(samples.time_s.windows(2).map(|pair| pair[1] - pair[0]));
     recordings.iter().filter_map(step).fold(0.0, f64::max)

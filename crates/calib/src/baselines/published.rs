@@ -9,23 +9,23 @@ use crate::enough::check;
 use crate::samples::{Samples, filled_strain};
 use ohmstrain_sensor::RangeParams;
 
-/// Time constants tried for one direction.
+/// Number of time constants tried for each direction.
 const TIME_CONSTANTS: usize = 80;
-/// The longest of them, in longest movements: an exponential that is a straight line by then.
+/// Longest of them, in durations of the longest movement; over that movement such an exponential is a straight line.
 const LONGEST: f64 = 30.0;
-/// The shortest of them, in longest movements.
+/// Shortest of them, in durations of the longest movement.
 const SHORTEST: f64 = 0.01;
 
 /// A phase and its rows.
 pub type PhaseRows = (Phase, Range<usize>);
 
-/// The published law taken literally, equation 8 of NOTATION.md, solved for the strain: `R = R_s + r₀ exp(-t/τ₀) u + η v` in a
-/// movement, t, R_s and the way u since it began, at the constant speed `v = u/t` of the paper's ramps. In a hold its readings
-/// carry no information on the strain, which stays. Each direction has numbers of its own. On recordings τ₀ goes as 1/v: the
-/// exponential mostly stands for the bend of the gauge curve.
+/// The published law taken literally: equation 8 of NOTATION.md, solved for the strain. In a movement, `R = R_s + r₀ exp(-t/τ₀) u + η v`,
+/// with the time t and the travel u since its start, the reading R_s there, and the constant speed `v = u/t` of the paper's ramps. In a
+/// hold the law's readings carry no information on the strain, which keeps its value. Each direction has its own parameters. On recordings,
+/// τ₀ is proportional to 1/v: the exponential mostly stands for the curvature of the gauge curve.
 ///
-/// It is given the times at which phases begin, and the strain of the first row, which are unknown on a worn sensor: the score is
-/// the best that the law itself allows.
+/// The law receives the times at which phases begin and the strain of the first row, both unknown on a worn sensor, so its score is the
+/// best that the law allows.
 #[derive(Clone, Copy, Debug)]
 pub struct PublishedLaw {
     extend: Movement,
@@ -44,17 +44,17 @@ struct Movement {
     tau_s: f64,
 }
 
-/// A movement that goes on.
+/// A movement in progress.
 #[derive(Clone, Copy)]
 struct Started {
     since_s: f64,
     strain: f64,
-    /// R_s, without the dash-pot's reading: the next movement adds its own.
+    /// R_s, without the dash-pot's contribution: the next movement adds its own.
     reading: f64,
     law: Movement,
 }
 
-/// A row of a movement, from its start and beyond the dash-pot's reading of the phase before.
+/// A row of a movement, relative to its start; the dash-pot's contribution of the previous phase is removed.
 struct MovingRow {
     elapsed_s: f64,
     travel: f64,
@@ -63,10 +63,10 @@ struct MovingRow {
 }
 
 impl PublishedLaw {
-    /// Least squares over all movements of recordings whose phases are known.
+    /// Fits by least squares over all movements of recordings whose phases are known.
     ///
     /// # Errors
-    /// If a recording is too short or the strain is constant, and if there is no movement in one of the directions.
+    /// If a recording is too short, the strain is constant, or one direction has no movement.
     pub fn fit(recordings: &[Samples], phases: &[Vec<PhaseRows>]) -> Result<Self, CalibrationError> {
         let (lower, upper) = check(recordings)?;
         let law = |direction: Phase| {
@@ -78,7 +78,7 @@ impl PublishedLaw {
         Ok(Self { extend, retract, range: RangeParams { lower, upper } })
     }
 
-    /// Starts on a recording whose phases begin at these times, s, and whose first strain is known.
+    /// Starts on a recording whose phases begin at these times, s, with the strain of its first row.
     #[must_use]
     pub fn start(&self, phases: Vec<(f64, Phase)>, strain: f64) -> impl Baseline + use<> {
         let mut held = Held::new(self.range);
@@ -110,7 +110,7 @@ fn moving_rows(samples: &Samples, phases: &[PhaseRows], direction: Phase) -> Vec
     found
 }
 
-/// r₀ and η by linear least squares for every time constant, and the one that leaves least.
+/// Fits r₀ and η by linear least squares for every time constant and returns the fit with the smallest residual.
 fn best_law(rows: &[MovingRow]) -> Option<Movement> {
     let longest_s = rows.iter().map(|row| row.elapsed_s).fold(0.0, f64::max);
     let tau_s = |i: usize| longest_s * SHORTEST * (LONGEST / SHORTEST).powf(i as f64 / (TIME_CONSTANTS - 1) as f64);
@@ -153,7 +153,7 @@ impl RunningPublished {
         self.started = law.map(|law| Started { since_s, strain, reading: before - law.viscosity_s * rate, law });
     }
 
-    /// Strain and rate.
+    /// Returns strain and strain rate.
     fn solved(&self, time_s: f64, reading: f64) -> Option<(f64, f64)> {
         let Started { since_s, strain, reading: at_start, law } = self.started?;
         let elapsed_s = time_s - since_s;

@@ -2,7 +2,7 @@ use crate::CalibrationError;
 use crate::samples::Samples;
 use crate::samples::reading_range;
 
-/// Centre and half the range of the readings, so that what regressions see is between -1 and 1 where they were fitted.
+/// Centre and half the range of the readings; scaled readings are between -1 and 1 on the rows of the fit.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ReadingScale {
     pub centre: f64,
@@ -10,7 +10,7 @@ pub(super) struct ReadingScale {
 }
 
 impl ReadingScale {
-    /// Over all rows with reading and strain. Readings that do not vary are an error.
+    /// Measures the scale over all rows with reading and strain. Constant readings are an error.
     pub(super) fn of(recordings: &[Samples]) -> Result<Self, CalibrationError> {
         let (low, high) = reading_range(recordings);
         if !(high > low) {

@@ -11,8 +11,8 @@ use ohmstrain_sensor::RangeParams;
 
 /// Features of the readings up to now, for a linear regression of strain.
 pub trait Features: Clone {
-    /// The regressors at `time_s`, the constant 1 first. `reading` is known, and scaled to be within ±1 where the
-    /// regression was fitted. Times increase.
+    /// Returns the regressors at `time_s`, the constant 1 first. `reading` is not missing, and is scaled to be within ±1 on the rows of the
+    /// fit. Times increase.
     fn next(&mut self, time_s: f64, reading: f64) -> Vec<f64>;
 }
 
@@ -30,12 +30,12 @@ pub struct Regression<F> {
     range: RangeParams,
 }
 
-/// Ridges tried, for regressions with more features than the data need. A larger one would flatten a feature to less than
-/// half of its effect alone: a rival so weak is none, whatever a few blocks of a short recording suggest.
+/// Ridges tried, for regressions with more features than the data need. A larger one would by itself flatten a feature to less than half of
+/// its effect, which would make the rival too weak, even if a few blocks of a short recording favour it.
 pub(super) const BASELINE_RIDGES: [f64; 7] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0];
 
 impl<F: Features> Regression<F> {
-    /// The candidate and ridge with the least error on blocks left out. The first `free` features are not penalised.
+    /// Fits the candidate and ridge with the least error on held-out blocks. The first `free` features are not penalised.
     pub(super) fn fit(
         recordings: &[Samples],
         candidates: impl IntoIterator<Item = F>,
@@ -62,7 +62,7 @@ impl<F: Features> Regression<F> {
         best.ok_or(CalibrationError::Singular)
     }
 
-    /// The regression before the first reading of a recording.
+    /// Returns the regression before the first reading of a recording.
     #[must_use]
     pub fn start(&self) -> impl Baseline + use<F> {
         let Self { features, scale, weights, range, .. } = self.clone();
@@ -70,7 +70,7 @@ impl<F: Features> Regression<F> {
     }
 }
 
-/// Normal equations over the rows with reading and strain, and the indices of the features.
+/// Returns the normal equations over the rows with reading and strain, and the indices of the features.
 fn normal_equations<F: Features>(
     recordings: &[Samples],
     features: &F,

@@ -6,7 +6,7 @@ use crate::CalibrationError;
 use crate::samples::Samples;
 use ohmstrain_sensor::{RangeParams, StaticCubic};
 
-/// Least squares over all rows with reading and strain.
+/// Fits by least squares over all rows with reading and strain.
 ///
 /// # Errors
 /// If the readings do not vary.
@@ -24,7 +24,7 @@ pub fn fit_static_cubic(recordings: &[Samples], range: RangeParams) -> Result<St
     Ok(StaticCubic { reading_centre, reading_scale, coefficients, range })
 }
 
-/// A static cubic, row by row.
+/// Returns the static cubic as a baseline that runs row by row.
 #[must_use]
 pub fn running_cubic(cubic: StaticCubic) -> impl Baseline + use<> {
     RunningCubic { cubic, held: Held::new(cubic.range) }

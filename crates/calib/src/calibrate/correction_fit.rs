@@ -19,19 +19,18 @@ use ohmstrain_sensor::{
     CorrectionParams, CorrectionScale, EstimatorKind, FilterParts, RangeParams, TrainingRow, future_features, outputs,
 };
 
-/// Pause between recordings, s: noise that lasts for seconds is not shared by them.
+/// Pause inserted between recordings, s, so that noise correlated over seconds is not shared between them.
 pub(crate) const PAUSE_S: f64 = 1000.0;
-/// Rows that a correction learns from at most. With a hundred errors are a tenth larger, with four hundred no smaller.
+/// Largest number of rows that a correction learns from. With 100, errors are a tenth larger; with 400, no smaller.
 const ROWS: usize = 200;
-/// Largest number of rows of several recordings whose information is used. With twice as many errors are no smaller.
+/// Largest number of rows of several recordings whose information is used. With twice as many, errors are no smaller.
 const ALL_ROWS: usize = 3000;
-/// Weight of the path that the features travel, against time, in the choice of rows: long holds repeat one row over and
-/// over again.
+/// Weight of the path length of the features, against time, in the choice of rows: long holds repeat the same row.
 const BY_WAY: f64 = 0.8;
 
-/// Learns the correction of a filter from the recordings that it was calibrated on, whose law is `fit`; `recipe`
-/// is the filter's, `corrects` its kind. With a prior of that filter the rows of other sensors come first, and half as many
-/// of their own follow. Returns `None` if nothing can be learned from them.
+/// Learns the correction of a filter from the recordings of its calibration. `fit` is their law, `recipe` the filter's, `corrects` its
+/// kind. With a prior for that filter, the rows of other sensors come first, followed by half as many of the sensor's own. Returns `None`
+/// if nothing can be learned from them.
 pub(crate) fn fit_correction(
     recordings: &[Samples],
     fit: &LawFit,
@@ -64,7 +63,7 @@ pub(crate) fn fit_correction(
     Ok(learn((corrects, scale), rows, (all, reference_sd(recordings)), &simulated, limits))
 }
 
-/// Root mean square of the standard deviations that the recordings' references have.
+/// Returns the root mean square of the reference's standard deviations.
 fn reference_sd(recordings: &[Samples]) -> f64 {
     let variances =
         recordings.iter().flat_map(|samples| samples.complete_rows().map(|k| samples.sd_of_strain(k).powi(2)));
@@ -90,7 +89,7 @@ fn learn(
     Some(CorrectionParams { corrects, readings, filter, smoother, simulated, rows })
 }
 
-/// Training rows by what filter and smoother see of them, and all rows that they stand for.
+/// Inputs of filter and smoother in the training rows, and in all the rows that these represent.
 pub(crate) struct CorrectorInputs {
     few: Columns,
     all: Option<AllOf>,
@@ -146,7 +145,7 @@ impl AllOf {
 }
 
 impl CorrectorInputs {
-    /// Collects the inputs of rows that stand for no others.
+    /// Collects the inputs of rows that represent no others.
     pub(crate) fn new(rows: &[TrainingRow]) -> Self {
         Self { few: Columns::new(rows.iter()), all: None, reference_sd: 0.0 }
     }
@@ -164,7 +163,7 @@ impl CorrectorInputs {
     }
 }
 
-/// A row with the digits that are kept.
+/// Rounds a row to the digits that are stored.
 pub(crate) fn rounded(row: &TrainingRow) -> TrainingRow {
     TrainingRow {
         time_s: digits(row.time_s),
@@ -176,8 +175,8 @@ pub(crate) fn rounded(row: &TrainingRow) -> TrainingRow {
     }
 }
 
-/// All rows of a recording with reading and strain, as the calibrated filter and smoother see them; none if the estimator
-/// has no smoother.
+/// Returns all rows of a recording with reading and strain, as the calibrated filter and smoother see them; `None` if the estimator has no
+/// smoother.
 fn candidate_rows(
     samples: &Samples,
     readings: &[Option<Reading<f64>>],
@@ -216,7 +215,7 @@ fn candidate_rows(
     Ok(Some(samples.complete_rows().filter_map(row).collect()))
 }
 
-/// Rows that are spread evenly over time and the path of the features of the past, in each recording by itself.
+/// Chooses rows spread evenly over time and over the path length of the past features, in each recording by itself.
 fn chosen(candidates: &[TrainingRow], recordings: &[Range<usize>], most: usize) -> Vec<TrainingRow> {
     let n = candidates.len();
     let sd = |i: usize| {
@@ -245,7 +244,7 @@ fn chosen(candidates: &[TrainingRow], recordings: &[Range<usize>], most: usize) 
     chosen
 }
 
-/// So many rows of a recording, the first among them, spread over time and the path whose steps are given.
+/// Chooses at most `most` rows of a recording, including the first, spread over time and over the path with these `steps`.
 fn spread(candidates: &[TrainingRow], steps: &[f64], most: usize) -> Vec<TrainingRow> {
     let n = candidates.len();
     let most = most.min(n);
@@ -257,7 +256,7 @@ fn spread(candidates: &[TrainingRow], steps: &[f64], most: usize) -> Vec<Trainin
     let mut rows = vec![candidates[0]];
     for (k, (row, step)) in candidates.iter().skip(1).zip(steps).enumerate() {
         gone += BY_WAY * step / way + (1.0 - BY_WAY) / (n - 1) as f64;
-        // As many as should have been chosen by now, and no more than rows are left for.
+        // Due: fewer rows are chosen than should be by now. Needed: no more rows remain than are still wanted.
         let due = gone * (most - 1) as f64 + 1.0 + 1e-9 >= (rows.len() + 1) as f64;
         let needed = most - rows.len() >= n - 1 - k;
         if rows.len() < most && (due || needed) {

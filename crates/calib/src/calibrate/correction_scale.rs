@@ -1,4 +1,4 @@
-//! The scale on which a correction sees readings, from the recordings that it learns from.
+//! Scale of the readings in a correction, from the recordings that it learns from.
 
 use ohmstrain_ekf::Reading;
 use ohmstrain_ekf::correction::{FEATURES, FeatureScale, ReadingFeatures, TIME_CONSTANTS_S, settled};
@@ -7,10 +7,11 @@ use crate::digits::digits;
 use crate::samples::Samples;
 use ohmstrain_sensor::CorrectionScale;
 
-/// Time constants after which a low-pass has forgotten where it started.
+/// Number of time constants after which a low-pass has forgotten its start.
 const FORGOTTEN: f64 = 2.0;
 
-/// The range of the readings, the usual size of their rates, and where their low-passes usually are; none if they do not vary.
+/// Returns the range of the readings, the usual size of their rates, and the usual values of their low-passes; `None` if the readings do
+/// not vary.
 pub(crate) fn reading_scale(recordings: &[Samples], readings: &[Vec<Option<Reading<f64>>>]) -> Option<CorrectionScale> {
     let known = readings.iter().flatten().flatten().map(|reading| reading.value);
     let (low, high) = known.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
@@ -32,7 +33,7 @@ pub(crate) fn reading_scale(recordings: &[Samples], readings: &[Vec<Option<Readi
     Some(CorrectionScale { centre, half_range, rates, starts: lines.map(|line| line.fitted().map(digits)) })
 }
 
-/// Shows each line its low-pass once it has forgotten its start, or at all rows of what is too short for that.
+/// Adds to each line its low-pass once that has forgotten its start; a recording too short for that counts with all its rows.
 fn see_low_passes(
     (time_s, readings): (&[f64], &[Option<Reading<f64>>]),
     scale: FeatureScale<f64>,
@@ -69,7 +70,7 @@ impl Line {
         self.product += dx * (y - self.mean[1]);
     }
 
-    /// a and b of least squares; a settled low-pass where x does not vary.
+    /// Returns a and b of the least-squares line; those of a settled low-pass if x does not vary.
     fn fitted(self) -> [f64; 2] {
         if !(self.square > 0.0) {
             return [0.0, 1.0];
@@ -79,7 +80,7 @@ impl Line {
     }
 }
 
-/// Visits every row, in order of time, with the features after it.
+/// Calls `visit` for every row, in order of time, with the features after it.
 pub(crate) fn each_row(
     time_s: &[f64],
     readings: &[Option<Reading<f64>>],
@@ -99,13 +100,13 @@ pub(crate) fn each_row(
 mod tests {
     use super::*;
 
-    /// Two sines, the readings of a motion that goes on for long, in half ranges of about one.
+    /// Returns a reading of a long motion: two sines, with a half range of about one.
     fn reading(time_s: f64) -> f64 {
         0.3 + 0.2 * (0.41 * time_s).sin() + 0.05 * (2.3 * time_s + 1.0).sin()
     }
 
-    /// Returns a low-pass of such readings once its start is forgotten, by the integral over the past: amplitude
-    /// 1/√(1 + (ωτ)²), phase −atan ωτ.
+    /// Returns a low-pass of these readings after its start is forgotten, by the integral over the past: amplitude 1/√(1 + (ωτ)²), phase
+    /// −atan ωτ.
     fn low_passed(time_s: f64, tau_s: f64) -> f64 {
         let sine = |size: f64, omega: f64, phase: f64| {
             let lag = (omega * tau_s).atan();
@@ -114,8 +115,8 @@ mod tests {
         0.3 + sine(0.2, 0.41, 0.0) + sine(0.05, 2.3, 1.0)
     }
 
-    /// A filter that is started in mid-motion is closer to where its low-passes would be than one that takes the first
-    /// reading for a rest, and as close as a straight line in the reading can be.
+    /// A filter started in mid-motion begins closer to its low-passes than one that takes the first reading for a rest, and as close as a
+    /// straight line in the reading can be.
     #[test]
     fn low_passes_start_where_they_usually_are() {
         let time_s: Vec<f64> = (0..6000).map(|k| 0.05 * f64::from(k)).collect();
@@ -132,11 +133,11 @@ mod tests {
                 (moments.iter().map(square).sum::<f64>() / moments.len() as f64).sqrt()
             };
             let (fitted, at_rest) = (off(&|y| a + b * y), off(&|y| y));
-            // No line is better: none with another offset or slope.
+            // The fitted line is the best: none with another offset or slope is better.
             for (da, db) in [(0.05, 0.0), (-0.05, 0.0), (0.0, 0.05), (0.0, -0.05)] {
                 assert!(off(&|y| a + da + (b + db) * y) > fitted, "τ = {tau_s} s: {a}, {b}");
             }
-            // A low-pass that is slower than the motion is near its mean, not at the reading.
+            // A low-pass slower than the motion stays near the mean, away from the reading.
             let most = if tau_s > 4.0 { 0.5 } else { 1.0 };
             assert!(fitted < most * at_rest, "τ = {tau_s} s: {fitted} {at_rest}");
         }

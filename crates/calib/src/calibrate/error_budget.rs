@@ -5,7 +5,7 @@ use crate::samples::central_rate;
 use crate::samples::{Samples, filled_strain};
 use ohmstrain_sensor::ErrorBudget;
 
-/// Shares of the error of what was left out.
+/// Splits the error on held-out blocks into its shares.
 pub(crate) fn error_budget(recordings: &[Samples], fit: &CrossFit, wrong: &WrongDirection) -> ErrorBudget {
     let (mut law, mut drift, mut noise, mut count) = (0.0, 0.0, 0.0, 0.0);
     for (block, without) in fit.without_block.iter().enumerate() {
@@ -35,7 +35,7 @@ pub(crate) fn error_budget(recordings: &[Samples], fit: &CrossFit, wrong: &Wrong
     }
 }
 
-/// Range of the readings.
+/// Returns the range of the readings.
 fn range(samples: &Samples) -> f64 {
     let known = samples.complete_rows().map(|k| samples.reading[k]);
     let (low, high) = extent(known);
@@ -45,8 +45,8 @@ fn range(samples: &Samples) -> f64 {
 /// Median of a χ² variable with one degree of freedom.
 const CHI_SQUARE_MEDIAN: f64 = 0.454_936;
 
-/// Variance of what is independent from row to row, from the median square of second differences, which a steady change
-/// does not touch: (x₋ − 2 x + x₊)² is 6 σ² on average.
+/// Estimates the variance of row-to-row independent noise from the median squared second difference, which a steady slope does not change:
+/// (x₋ − 2 x + x₊)² is 6 σ² on average.
 fn white_variance(x: &[f64]) -> f64 {
     let squares = x.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).powi(2));
     median(squares).map_or(0.0, |median| median / (6.0 * CHI_SQUARE_MEDIAN))
@@ -66,7 +66,7 @@ impl Direction {
     }
 }
 
-/// Rows in which a filter has the direction wrong.
+/// Counts and squared errors of the rows in which a filter has the direction wrong.
 #[derive(Debug, Default)]
 pub(crate) struct WrongDirection {
     rows: f64,
@@ -76,7 +76,7 @@ pub(crate) struct WrongDirection {
 }
 
 impl WrongDirection {
-    /// Takes a row: the true direction, the estimated rate, the error of the strain.
+    /// Adds a row: the true direction, the estimated rate, the error of the strain.
     pub(crate) fn see(&mut self, truth: Direction, rate: f64, error: f64) {
         let is_wrong = f64::from(truth.0) * rate < 0.0;
         self.all_squared_error += error * error;
@@ -94,8 +94,8 @@ mod tests {
 
     use super::white_variance;
 
-    /// Second differences of white noise with deviation 0.3 on a steep line. The median of n = 20 000 squares, neighbours
-    /// correlated, is known to a few percent.
+    /// Second differences of white noise with standard deviation 0.3 on a steep line. The squares of neighbours are correlated, so the
+    /// median of n = 20 000 is known to a few percent.
     #[test]
     fn noise_is_told_from_a_steady_change() {
         let mut state = 1_u64;
@@ -118,12 +118,12 @@ mod tests {
             wrong_rows: 0.1,
             wrong_error,
         };
-        // Squares 9, 1, 0.25 of 10.25: law has 0.878 of what the direction leaves.
+        // Squares 9, 1, 0.25 of 10.25: the law has a share of 0.878 in what the direction leaves.
         assert_eq!(budget(3.0, 1.0, 0.5, 0.4).limit(), Limit::Law);
         assert_eq!(budget(1.0, 3.0, 0.5, 0.4).limit(), Limit::Drift);
         assert_eq!(budget(1.0, 0.5, 3.0, 0.4).limit(), Limit::Noise);
         assert_eq!(budget(3.0, 1.0, 0.5, 0.6).limit(), Limit::Direction);
-        // Less than half, and more than any other: 0.4 against 0.6 / 2.
+        // Less than half, but more than any other: 0.4 against 0.6 / 2.
         assert_eq!(budget(2.0, 2.0, 0.0, 0.4).limit(), Limit::Direction);
         let shares = budget(3.0, 1.0, 0.5, 0.4).shares();
         assert!((shares.law - 0.6 * 9.0 / 10.25).abs() < 1e-15 && shares.direction == 0.4);

@@ -23,7 +23,7 @@ use ohmstrain_sensor::{
 };
 use rayon::prelude::*;
 
-/// Contents of the recordings of a calibration.
+/// Summarises the recordings of a calibration.
 pub(crate) fn seen(recordings: &[Samples], range: RangeParams, stats: &MotionStats) -> RecordingSummary {
     let mut counts = [0_usize; TENTHS];
     for samples in recordings {
@@ -49,9 +49,9 @@ pub(crate) struct Check<'a> {
     pub recordings: &'a [Samples<'a>],
     pub fit: &'a CrossFit,
     pub kind: EstimatorKind,
-    /// The filter that runs: itself, or the one that it corrects.
+    /// The filter that runs: the estimator itself, or the filter that it corrects.
     pub filter: EstimatorKind,
-    /// Noise and motion, that of the estimator and of what smooths in its place among them.
+    /// Noise and motion by estimator; those of `filter` are used.
     pub estimators: &'a BTreeMap<EstimatorKind, EstimatorParams>,
     /// Prior on the correction from other sensors of the make.
     pub of_make: Option<&'a CorrectionPrior>,
@@ -68,25 +68,25 @@ pub struct LeftOutRow {
     pub truth: f64,
     /// The filter's strain.
     pub strain: f64,
-    /// Its standard deviation, with the error that is not stated in other quarters.
+    /// Its standard deviation, including the unstated error estimated on the other quarters.
     pub strain_sd: f64,
     /// The static cubic's strain.
     pub static_cubic: f64,
 }
 
-/// Rows of all recordings that were scored, in a row.
+/// Scored rows of all recordings, one after the other.
 #[derive(Default)]
 struct Scored {
     rows: Vec<LeftOutRow>,
     filter: Vec<ScoredRow>,
     smoother: Vec<ScoredRow>,
     static_cubic: Vec<ScoredRow>,
-    /// Direction of the body's motion, the filter's direction, and the error of its strain, row by row of the filter's.
+    /// Direction of the body's motion, the estimated rate, and the error of the strain, for each row of the filter.
     directions: Vec<(Direction, f64, f64)>,
 }
 
 impl Scored {
-    /// Adds rows at the times after these.
+    /// Appends rows, at later times.
     fn append(&mut self, next: Self) {
         let offset_s = self.filter.last().map_or(0.0, |row| row.time_s);
         let later = |row: ScoredRow| ScoredRow { time_s: offset_s + row.time_s, ..row };
@@ -97,7 +97,7 @@ impl Scored {
         self.directions.extend(next.directions);
     }
 
-    /// Adds errors that are not stated to the deviations.
+    /// Adds unstated errors to the standard deviations.
     fn widen(&mut self, unstated: Unstated) {
         self.rows.iter_mut().for_each(|row| row.strain_sd = row.strain_sd.hypot(unstated.filter_sd));
         self.filter.iter_mut().for_each(|row| *row = row.with_unstated(unstated.filter_sd));
@@ -114,12 +114,12 @@ impl Scored {
 /// Quality of a calibration on held-out quarters.
 pub(crate) struct Checked {
     pub findings: Findings,
-    /// Errors on them that the estimators do not state.
+    /// Unstated errors of the estimators on them.
     pub unstated: Unstated,
     pub rows: Vec<LeftOutRow>,
 }
 
-/// Errors in quarters that the estimators do not state.
+/// Returns the unstated errors of the estimators in these quarters.
 fn unstated_in<'b>(blocks: impl Iterator<Item = &'b Scored>) -> Unstated {
     let (mut filter, mut smoother) = (Vec::new(), Vec::new());
     for block in blocks {
@@ -129,8 +129,8 @@ fn unstated_in<'b>(blocks: impl Iterator<Item = &'b Scored>) -> Unstated {
     unstated(&filter, &smoother)
 }
 
-/// Returns all rows, those of each quarter with the errors that are not stated in the others: coverage in it is that of a part
-/// that nothing was learned from.
+/// Returns all rows. Those of each quarter include the unstated errors of the other quarters, so that its coverage is that of held-out
+/// data.
 fn widened(mut blocks: Vec<Scored>) -> Scored {
     let others = |block: usize| blocks.iter().enumerate().filter(move |(k, _)| *k != block).map(|(_, scored)| scored);
     let unstated: Vec<Unstated> = (0..blocks.len()).map(|block| unstated_in(others(block))).collect();
@@ -143,7 +143,7 @@ fn widened(mut blocks: Vec<Scored>) -> Scored {
 }
 
 impl Check<'_> {
-    /// Scores every quarter with what was fitted to the others; `None` if they cannot be estimated.
+    /// Scores every quarter with the fit to the others; `None` if they cannot be estimated.
     pub(crate) fn checked(&self, seen: RecordingSummary, identifiability: &Option<Identifiability>) -> Option<Checked> {
         let blocks = self.blocks().ok()?;
         let unstated = unstated_in(blocks.iter());
@@ -215,14 +215,14 @@ impl Check<'_> {
         Ok(scored)
     }
 
-    /// The strain of a recording, unknown in a block.
+    /// Returns the strain of a recording, NaN within a block.
     fn masked(&self, recording: usize, samples: &Samples, block: usize) -> Vec<f64> {
         let mut strain = samples.strain.to_vec();
         strain[self.fit.blocks[recording][block].clone()].fill(f64::NAN);
         strain
     }
 
-    /// Recipes of filter and smoother, and their correction, from the strains of `training` alone.
+    /// Returns filter and smoother under that law, and their correction, learned from the strains of `training` alone.
     fn estimator_without<'b>(&self, law: &'b LawFit, training: &[Samples]) -> Result<Trained<'b>, CalibrationError> {
         let limits = self.fit.law.law.range;
         let recipe = |kind: EstimatorKind| {

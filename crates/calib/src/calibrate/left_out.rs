@@ -7,27 +7,25 @@ use crate::law::fit::CrossFit;
 use crate::samples::Samples;
 use ohmstrain_sensor::{FilterParts, LawParams, RangeParams};
 
-/// Standard deviation that every reference has of its own, as a share of the strain's range: no score can be had from
-/// being more precise.
+/// Standard deviation assumed for every reference, as a fraction of the strain's range; greater precision does not improve the score.
 pub(crate) const REFERENCE_SD: f64 = 0.005;
 
-/// The recordings, block by block, each block with the law that was fitted without it.
+/// The recordings, block by block, each with the law that was fitted without it.
 ///
-/// With a law that has seen the block the residuals are too small, and a filter tuned on them believes its law more than
-/// it may elsewhere.
+/// Residuals of a law that has seen the block are too small. A filter tuned on them would trust its law more than is justified elsewhere.
 pub(crate) struct LeftOut<'a> {
     runs: Vec<Run<'a>>,
     limits: RangeParams,
 }
 
-/// FilterParts of a filter for a law that was fitted without a block.
+/// Function that builds the parts of a filter for a law fitted without a block.
 pub(crate) type Build<'a> = dyn Fn(Fold<'_>) -> FilterParts<'_> + Sync + 'a;
 
 /// A law that was fitted without a block.
 #[derive(Clone, Copy)]
 pub(crate) struct Fold<'a> {
     pub law: &'a LawParams,
-    /// R₀ of that law in the recording, which readings are relative to.
+    /// R₀ of that law in the recording; readings are relative to it.
     pub rest_reading: f64,
 }
 
@@ -35,7 +33,7 @@ pub(crate) struct Fold<'a> {
 pub(crate) struct PredictedFall {
     pub recording: usize,
     pub row: usize,
-    /// Relative to R₀.
+    /// Predicted fall, relative to R₀.
     pub predicted: f64,
     /// R₀ of that law.
     pub rest_reading: f64,
@@ -46,7 +44,7 @@ struct Run<'a> {
     fold: Fold<'a>,
     recording: usize,
     time_s: Vec<f64>,
-    /// Relative to the R₀ of that law.
+    /// Readings relative to the R₀ of that law.
     reading: Vec<Option<Reading<f64>>>,
     strain: Vec<f64>,
     /// Standard deviations of the true strains.
@@ -62,8 +60,8 @@ struct Truth {
 }
 
 impl Truth {
-    /// Error of an estimate in units of its standard deviation. The reference's error may have been learned with the strain: it counts as
-    /// one that the difference does not show.
+    /// Returns the error of an estimate in units of its standard deviation. The reference's error may have been learned with the strain,
+    /// and then the difference does not show it; it is added in quadrature.
     fn deviation(self, strain: Gaussian<f64>) -> f64 {
         (strain.mean - self.strain).hypot(self.sd) / strain.sd()
     }
@@ -76,7 +74,7 @@ impl Run<'_> {
 }
 
 impl<'a> LeftOut<'a> {
-    /// Takes every `stride`-th row. The model is continuous in time, so that the same parameters fit any sampling.
+    /// Takes every `stride`-th row. The model is continuous in time, so the same parameters fit any sampling.
     pub(crate) fn new(samples: &[Samples], fit: &'a CrossFit, limits: RangeParams, stride: usize) -> Self {
         let mut runs = Vec::new();
         for (block, law) in fit.without_block.iter().enumerate() {
@@ -98,8 +96,8 @@ impl<'a> LeftOut<'a> {
         Self { runs, limits }
     }
 
-    /// Mean negative log density of the true strain under the filter, strain in units of its range. Infinite if the
-    /// filter fails.
+    /// Returns the mean negative log density of the true strain under the filter, with strain in units of its range. Infinite if the filter
+    /// fails.
     pub(crate) fn score(&self, build: &Build) -> f64 {
         let span = self.limits.span();
         let terms = self.of_rows(build, |strain, truth| {
@@ -112,7 +110,7 @@ impl<'a> LeftOut<'a> {
         sum / count.max(1) as f64
     }
 
-    /// Errors of the filter in units of its deviation, block by block; `None` if it fails.
+    /// Returns the filter's errors in units of their standard deviation, block by block; `None` if it fails.
     pub(crate) fn filtered_deviations(&self, build: &Build) -> Option<Vec<Vec<f64>>> {
         self.of_rows(build, |strain, truth| truth.deviation(strain))
     }
@@ -128,8 +126,8 @@ impl<'a> LeftOut<'a> {
         self.of_runs(of_run)
     }
 
-    /// Returns a filter's predictions in `rows` of each recording, in order, of the fall of the readings; `None` if it fails. Valid only
-    /// if no row was left out for a stride.
+    /// Returns the filter's predictions of the fall of the readings, in the given `rows` of each recording, in order; `None` if it fails.
+    /// Valid only at a stride of 1.
     pub(crate) fn falls(&self, build: &Build, rows: &[Vec<usize>]) -> Option<Vec<PredictedFall>> {
         let mut falls = Vec::new();
         for run in &self.runs {
@@ -150,15 +148,15 @@ impl<'a> LeftOut<'a> {
         Some(falls)
     }
 
-    /// Applies `of` to the runs, the longest ones first: the last one to begin ends the wait. Results are in order of the runs.
+    /// Applies `of` to the runs, the longest first, so that no long run starts last. Results are in the order of the runs.
     fn of_runs<X: Send>(&self, of: impl Fn(&Run) -> Option<X> + Sync) -> Option<Vec<X>> {
         let mut backwards: Vec<X> = self.runs.par_iter().rev().map(&of).collect::<Option<_>>()?;
         backwards.reverse();
         Some(backwards)
     }
 
-    /// Applies `of` to estimate and true strain in every row of every block, block by block: the filter runs from the first row to the end
-    /// of the block. Returns `None` if it fails.
+    /// Applies `of` to estimate and true strain in every row of every block. For each block, the filter runs from the first row of the
+    /// recording to the end of the block. Returns `None` if it fails.
     fn of_rows(&self, build: &Build, of: impl Fn(Gaussian<f64>, Truth) -> f64 + Sync) -> Option<Vec<Vec<f64>>> {
         let of_run = |run: &Run| {
             let mut filter = build(run.fold).filter(None).ok()?;
@@ -175,7 +173,7 @@ impl<'a> LeftOut<'a> {
     }
 }
 
-/// Readings over R₀ minus 1; `None` where missing.
+/// Returns readings over R₀ minus 1; `None` where missing.
 pub(crate) fn relative_changes(reading: &[f64], rest_reading: f64) -> Vec<Option<Reading<f64>>> {
     reading.iter().map(|r| r.is_finite().then(|| Reading::from(r / rest_reading - 1.0))).collect()
 }

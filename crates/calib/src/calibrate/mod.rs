@@ -49,21 +49,21 @@ use ohmstrain_sensor::{
 pub enum Stage {
     /// Fitting the law.
     Law,
-    /// Fitting noise and motion for an estimator: evaluations done and expected.
+    /// Fitting noise and motion for an estimator.
     Noise {
         /// Evaluations of the score so far.
         done: u64,
         /// Evaluations expected.
         expected: u64,
     },
-    /// Estimating every quarter of the recordings with what was fitted to the others.
+    /// Estimating every quarter of the recordings with the fit to the others.
     LeftOut,
 }
 
 /// A calibrated sensor, before it is written down.
 #[derive(Clone, Debug)]
 pub struct Calibration {
-    /// Rows of the recordings that were left out, for standing far from their neighbours or from the law.
+    /// Rows of the recordings that were left out because they are far from their neighbours or from the law.
     pub distrusted: Vec<Distrusted>,
     /// The law.
     pub law: LawParams,
@@ -71,10 +71,10 @@ pub struct Calibration {
     pub rest_readings: Vec<f64>,
     /// Reading of the rested sensor over R₀, if a recording begins at rest.
     pub rest_share: Option<f64>,
-    /// Uncertainty of the law's parameters given the recordings: without the ridge, as in [`identifiability`]; `None` if they
-    /// are not determined without it.
+    /// Uncertainty of the law's parameters given the recordings, without the ridge, as in [`identifiability`]; `None` if the parameters are
+    /// not determined without it.
     pub uncertainty: Option<Uncertainty>,
-    /// The estimator that did best.
+    /// Estimator with the best score.
     pub default_estimator: EstimatorKind,
     /// Noise and motion, per estimator.
     pub estimators: BTreeMap<EstimatorKind, EstimatorParams>,
@@ -97,8 +97,8 @@ pub struct Calibration {
 }
 
 impl Calibration {
-    /// The parameters of the sensor, in these units: R₀ is the median of the recordings', and what calibration does not
-    /// know (a joint, names and hashes of recordings) is left empty.
+    /// Returns the parameters of the sensor, in these units. R₀ is the median over the recordings. Fields that calibration does not
+    /// determine (a joint, names and hashes of recordings) are left empty.
     #[must_use]
     pub fn into_sensor(self, made_by: &str, quantity: Quantity, reading: ReadingUnit) -> SensorParams {
         let rest_reading = median_rest(&self.rest_readings);
@@ -128,30 +128,29 @@ impl Calibration {
     }
 }
 
-/// R₀ of the sensor from those of its recordings.
+/// Returns R₀ of the sensor, the median over its recordings.
 fn median_rest(rest_readings: &[f64]) -> f64 {
     median(rest_readings.iter().copied()).unwrap_or(f64::NAN)
 }
 
-/// Margin, in mean log density of the strain, by which a single Gaussian must be better than hypotheses: once it has taken the
-/// wrong direction it does not come back, and a short recording may not show that. Ten per cent in the deviation.
+/// Margin, in mean log density of the strain, by which a single Gaussian must be better than hypotheses: 10 % in the standard deviation.
+/// Once a single Gaussian has taken the wrong direction it does not recover, which a short recording may not show.
 const LOCK_IN: f64 = 0.1;
 
 fn handicap(kind: EstimatorKind) -> f64 {
     if kind.has_phases() { 0.0 } else { LOCK_IN }
 }
 
-/// Calibrates law, noise and motion on recordings with known strain. Deterministic: same samples, same result, in whatever order the
-/// recordings are given. Outliers, and rows far from the law, take no part ([`screen`]).
+/// Calibrates law, noise and motion on recordings with known strain. Deterministic: same samples, same result, in any order of the
+/// recordings. Outliers, and rows far from the law, are left out ([`screen`]).
 ///
-/// Estimators are tried with a law for each of `structures` and each strength of ridge; the pair with the best score on
-/// blocks that the law has not seen gives the law. Every one of them, and the extended Kalman filter in any case, is then
-/// fitted to that law, and the best of `kinds` by every row of those blocks becomes the default. Near ties go to the one that keeps
-/// hypotheses. [`EstimatorKind::Corrected`] is the default if it is requested; it corrects the best of its candidates, and
-/// is learned last, from the same rows.
+/// Estimators are tried with a law for each of `structures` and each strength of ridge. The pair with the best score on held-out blocks
+/// determines the law. Every estimator, and the extended Kalman filter in any case, is then fitted to that law; the one of `kinds` with the
+/// best score on every row of those blocks becomes the default. Near ties go to the one that keeps hypotheses. [`EstimatorKind::Corrected`]
+/// is the default if it is requested; it corrects the best of its candidates, and is learned last, from the same rows.
 ///
 /// # Errors
-/// If the recordings are too short or too plain to learn a law from, if the law explains nothing, or `structures` or `kinds` is
+/// If the recordings are too short or vary too little to learn a law from, if the law explains nothing, or if `structures` or `kinds` is
 /// empty.
 pub fn calibrate(
     recordings: &[Samples],
@@ -162,7 +161,7 @@ pub fn calibrate(
     calibrate_once(recordings, structures, kinds, None, progress)
 }
 
-/// [`calibrate`] with a prior, or without.
+/// Runs [`calibrate`], with or without a prior.
 pub(crate) fn calibrate_once(
     recordings: &[Samples],
     structures: &[LawOptions],
@@ -249,9 +248,9 @@ fn calibrate_arranged(
     })
 }
 
-/// Estimators that a calibration is to try.
+/// Estimators that a calibration tries.
 struct Asked<'a> {
-    /// Estimators that the caller asked for themselves.
+    /// Estimators that the caller requested by name.
     named: Vec<EstimatorKind>,
     /// Candidates for the correction: the best of them is corrected.
     candidates: &'a [EstimatorKind],
@@ -271,26 +270,27 @@ impl<'a> Asked<'a> {
         EstimatorKind::distinct(self.candidates.iter().chain(&self.named).copied())
     }
 
-    /// Near enough for a progress bar: surveys, and a refinement of each filter and of the EKF.
+    /// Returns the approximate number of evaluations, for a progress bar: surveys, and a refinement of each filter and of the EKF.
     fn expected_evaluations(&self, laws: &[CrossFit]) -> u64 {
         let surveys = self.all().len() as u64 * survey_evaluations(laws.len());
         surveys + SURVEY.evaluations() + (self.all().len() as u64 + 1) * REFINEMENT.evaluations()
     }
 }
 
-/// The best, but for the handicap.
+/// Returns the survey with the least cost, handicap included.
 fn cheapest<'s, 'a: 's>(surveyed: impl Iterator<Item = &'s Surveyed<'a>>) -> Option<&'s Surveyed<'a>> {
     let cost = |one: &Surveyed| one.tuned.cost + handicap(one.kind);
     surveyed.min_by(|a, b| cost(a).total_cmp(&cost(b)))
 }
 
-/// Ranges seen in calibration. Readings count relative to R₀ of their recording: in ohms another session's would hide how far a strain leads.
+/// Returns the calibrated ranges. Readings are relative to the R₀ of their recording; in ohms, the spread between sessions would hide how
+/// far a strain moves the reading.
 fn validity(recordings: &[Samples], fit: &LawFit, limits: RangeParams, stats: &MotionStats) -> Validity {
     let rest_readings = &fit.rest_readings;
     let rest = median_rest(rest_readings);
     let of_sensor = |of: f64, samples: &Samples| {
         let (low, high) = reading_range(std::slice::from_ref(samples));
-        // One recording keeps its readings to the last digit.
+        // A single recording keeps its readings to the last digit.
         if of == rest { (low, high) } else { (low / of * rest, high / of * rest) }
     };
     let ranges = recordings.iter().zip(rest_readings).map(|(samples, of)| of_sensor(*of, samples));
@@ -312,7 +312,7 @@ fn validity(recordings: &[Samples], fit: &LawFit, limits: RangeParams, stats: &M
     Validity { longest_unturned_s: (longest_s > 0.0).then_some(longest_s), ..seen }
 }
 
-/// The correction of the calibrated filter; none if nothing can be learned about it.
+/// Learns the correction of the calibrated filter; `None` if nothing can be learned.
 fn correction(
     recordings: &[Samples],
     fit: &CrossFit,
@@ -339,8 +339,8 @@ impl<P: FnMut(Stage)> Steps<P> {
     }
 }
 
-/// Surveys estimators under the laws. Of the candidates for a correction the first one is tried under all of them, the
-/// others under those that served it best.
+/// Surveys estimators under the laws. The first of the candidates for a correction is tried under all of them, the others under the laws
+/// that suited it best.
 fn survey_all<'a>(
     recordings: &[Samples],
     laws: &'a [CrossFit],
@@ -359,7 +359,7 @@ fn survey_all<'a>(
     Ok(surveyed)
 }
 
-/// Noise and motion of an estimator under a law; a `known` survey is not made again.
+/// Fits noise and motion of an estimator under a law; a `known` survey is not repeated.
 fn refined(
     recordings: &[Samples],
     (fit, stats): (&CrossFit, MotionStats),

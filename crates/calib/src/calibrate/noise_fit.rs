@@ -15,9 +15,9 @@ use ohmstrain_sensor::{
     EstimatorKind, EstimatorParams, FilterParts, MotionParams, NoiseParams, PhaseParams, RangeParams, SettlingParams,
 };
 
-/// Pull toward the starting values, per squared step of a log-parameter: a score from one recording must not run away.
+/// Pull toward the starting values, per squared step of a log-parameter; keeps the score of a single recording from running away.
 const REGULARISATION: f64 = 1e-2;
-/// A local search.
+/// Settings of a local search.
 #[derive(Clone, Copy)]
 pub(crate) struct Search {
     /// Side of the first simplex in log-parameters.
@@ -26,8 +26,7 @@ pub(crate) struct Search {
     steps: u64,
     /// Number of rows to which the recordings are thinned.
     rows: usize,
-    /// Factor on the longest step of sign-split: thinned rows are far apart, and would be divided into as many steps as all
-    /// rows.
+    /// Factor on the longest step of sign-split. Thinned rows are far apart, and would otherwise be divided into as many steps as all rows.
     step_factor: f64,
 }
 
@@ -40,38 +39,37 @@ const RESURVEY: Search = Search { side: 0.4, steps: 25, rows: 500, step_factor: 
 pub(crate) const REFINEMENT: Search = Search { side: 0.3, steps: 45, rows: 1500, step_factor: 1.0 };
 
 impl Search {
-    /// Evaluations to expect: a step of the simplex evaluates one or two points.
+    /// Returns the expected number of evaluations: a step of the simplex evaluates one or two points.
     pub(crate) const fn evaluations(self) -> u64 {
         self.steps * 3 / 2
     }
 }
 
-/// Evaluations to expect of a survey under so many laws.
+/// Returns the expected number of evaluations of a survey under this many laws.
 pub(crate) fn survey_evaluations(laws: usize) -> u64 {
     SURVEY.evaluations() + (laws.max(1) as u64 - 1) * RESURVEY.evaluations()
 }
 
-/// Times over which errors of readings may be alike, in steps of the rows that a search has seen, from not at all to much
-/// longer.
+/// Correlation times of the readings' errors that are tried, in steps of the thinned rows, from zero to much longer.
 const ERROR_TIMES: [f64; 5] = [0.0, 0.25, 1.0, 4.0, 16.0];
 
-/// Rows on which the smoother's intervals are looked at; smoothing costs ten times as much as filtering.
+/// Number of rows on which the smoother's intervals are checked; smoothing costs ten times as much as filtering.
 pub(crate) const SMOOTHED_ROWS: usize = 2000;
 /// First guess of the baseline's correlation time, s.
 const BASELINE_TIME_S: f64 = 8.0;
-/// First guess of white noise and branch noise, as a share of the law's residual.
+/// First guess of white noise and branch noise, as a fraction of the law's residual.
 const SHARE_OF_RESIDUAL: f64 = 0.3;
-/// First guess of the tempering: model error is correlated from reading to reading.
+/// First guess of the tempering, below 1 because model error is correlated from reading to reading.
 const TEMPERING: f64 = 0.7;
 
-/// Result of an estimator with a law.
+/// Result of a search for an estimator under a law.
 pub(crate) struct Surveyed<'a> {
     pub kind: EstimatorKind,
     pub law: &'a CrossFit,
     pub tuned: Tuned,
 }
 
-/// Searches under one law after another, each from where the one before has got to.
+/// Searches under one law after another, each from the end point of the one before.
 pub(crate) fn survey<'a>(
     samples: &[Samples],
     laws: &[&'a CrossFit],
@@ -90,7 +88,7 @@ pub(crate) fn survey<'a>(
     Ok(surveyed)
 }
 
-/// The best law of each number of branches.
+/// Returns the best law of each number of branches.
 pub(crate) fn best_of_each_size<'a>(surveyed: &[Surveyed<'a>]) -> Vec<&'a CrossFit> {
     let mut best: BTreeMap<usize, &Surveyed<'a>> = BTreeMap::new();
     for one in surveyed {
@@ -111,8 +109,7 @@ pub(crate) struct Tuned {
     pub cost: f64,
 }
 
-/// Noise and motion of one estimator, given a law: fitted so that the filter's own posterior is right on the known
-/// strain.
+/// Search for noise and motion of one estimator, given a law, such that the filter's posterior fits the known strain.
 pub(crate) struct NoiseProblem<'a> {
     samples: &'a [Samples<'a>],
     fit: &'a CrossFit,
@@ -121,7 +118,7 @@ pub(crate) struct NoiseProblem<'a> {
     kind: EstimatorKind,
     /// Prior from other sensors of the make.
     of_make: Option<&'a EstimatorPrior>,
-    /// Logarithms of the parameters that residuals and motion suggest, or those sensors.
+    /// Logarithms of the starting values, from residuals and motion, or from those sensors.
     untuned: Vec<f64>,
 }
 
@@ -148,7 +145,7 @@ impl<'a> NoiseProblem<'a> {
         self.of_make.map_or_else(|| REGULARISATION * flat(), |prior| prior.pull(point, self.stats.longest_s))
     }
 
-    /// Searches from the values that residuals and motion suggest, or from where another search has got to.
+    /// Searches from the values that residuals and motion suggest, or from the end point of another search.
     pub(crate) fn search(
         &self,
         from: Option<&Tuned>,
@@ -168,9 +165,8 @@ impl<'a> NoiseProblem<'a> {
         Ok(Tuned { cost: cost(&point), point })
     }
 
-    /// Searches on from a survey. Where that has not seen every row, it finds the time over which errors of the readings are
-    /// alike: that with which the parameters do best on every row. What residuals and motion suggest without a search
-    /// competes there: most of these rows the search has not seen.
+    /// Continues a survey's search. If that thinned the rows, it also chooses the correlation time of the readings' errors with the best
+    /// score on every row. The starting values compete as well, because the search has not seen most of these rows.
     pub(crate) fn refine(&self, from: &Tuned, evaluated: impl FnMut()) -> Result<EstimatorParams, CalibrationError> {
         let refined = self.search(Some(from), REFINEMENT, evaluated)?.point;
         let stride = self.stride(REFINEMENT.rows);
@@ -190,7 +186,8 @@ impl<'a> NoiseProblem<'a> {
         Ok(self.finish(&every_row, best.1, best.0))
     }
 
-    /// The parameters with errors that are alike over `error_time_s`, as they were found on rows every `step_s` seconds.
+    /// Returns the parameters with a correlation time of `error_time_s` for the readings' errors, given those found on rows every `step_s`
+    /// seconds.
     fn alike_over(&self, point: &[f64], error_time_s: f64, step_s: f64) -> EstimatorParams {
         let mut params = self.params(point);
         params.noise.reading_time_s = error_time_s;
@@ -198,9 +195,9 @@ impl<'a> NoiseProblem<'a> {
         params
     }
 
-    /// The parameters with their score, and the factors that make their intervals cover the blocks left out.
+    /// Returns the parameters with their score and the factors that make their intervals cover the held-out blocks.
     fn finish(&self, left_out: &LeftOut, params: EstimatorParams, score: f64) -> EstimatorParams {
-        // A short motion shows less of what may go wrong.
+        // A short motion shows fewer of the possible errors.
         let of_make = self.of_make.map_or(1.0, |prior| prior.strain_sd_scale);
         let filtered = left_out.filtered_deviations(&|fold| self.recipe(self.kind, fold, params));
         let smoothed =
@@ -214,7 +211,7 @@ impl<'a> NoiseProblem<'a> {
         }
     }
 
-    /// Returns the settling of the filter in the holds, block by block.
+    /// Returns the settling of the filter in the holds of held-out blocks.
     fn settling(&self, left_out: &LeftOut, params: EstimatorParams) -> Option<SettlingParams> {
         let holds = LongHolds::new(self.samples, self.limits.span())?;
         let params = EstimatorParams { settling: Some(holds.law()), ..params };
@@ -233,7 +230,7 @@ impl<'a> NoiseProblem<'a> {
         stride(self.samples, rows)
     }
 
-    /// The point that the law's residuals and the motion of the strain suggest.
+    /// Returns the point that the law's residuals and the motion of the strain suggest.
     fn start(&self) -> Vec<f64> {
         let mut left_out = Vec::new();
         for (block, law) in self.fit.without_block.iter().enumerate() {
@@ -298,10 +295,10 @@ impl<'a> NoiseProblem<'a> {
     }
 }
 
-/// Values of the filters without phases.
+/// Number of values of a filter without phases.
 const OF_ALL: usize = 7;
 
-/// Parameters that a search finds, by name; their logarithms in this order are its point.
+/// Parameters that a search finds, by name; their logarithms, in this order, are its point.
 struct Values {
     baseline_sd: f64,
     baseline_time_s: f64,
@@ -322,7 +319,7 @@ struct PhaseValues {
 }
 
 impl Values {
-    /// Reads a point of a search; a value that it does not have is NaN.
+    /// Reads a point of a search; missing values are NaN.
     fn of(point: &[f64]) -> Self {
         let mut values = point.iter().map(|x| x.clamp(-25.0, 15.0).exp());
         let mut next = || values.next().unwrap_or(f64::NAN);
@@ -343,7 +340,7 @@ impl Values {
         }
     }
 
-    /// The point of a search at these values.
+    /// Returns the point of a search at these values.
     fn point(&self) -> Vec<f64> {
         let Self { baseline_sd, baseline_time_s, reading_sd, branch_sd, rate_sd_per_s, rate_time_s, strain_sd, phases } =
             self;

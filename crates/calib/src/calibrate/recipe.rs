@@ -3,21 +3,20 @@ use ohmstrain_sensor::EstimatorKind;
 /// Components of the default estimator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Recipe {
-    /// The filters to choose from, by how well each does on every row of blocks that the law has not seen. The first one is tried
-    /// under every law, the others under the laws that serve it best, and only where the body rests for a tenth of the time or more.
+    /// Filters to choose from, by their scores on every row of held-out blocks. The first is tried under every law, the others under the
+    /// laws that suit it best, and only if the body rests for a tenth of the time or more.
     pub filters: &'static [EstimatorKind],
-    /// Default estimator, which is calibrated unless another one is requested: the filter with its strain
-    /// corrected, or as it is.
+    /// Default estimator, calibrated unless another is requested: the filter, with or without corrected strain.
     pub estimator: EstimatorKind,
 }
 
-/// One filter under one law with one learned correction, the same on a laptop and on a chip. Sign-split follows a body that
-/// moves; phase histories keep their way through holds of minutes.
+/// One filter under one law with one learned correction, the same on a laptop and on a chip. Sign-split follows a body that moves; phase
+/// histories keep their direction through holds of minutes.
 pub const RECIPE: Recipe =
     Recipe { filters: &[EstimatorKind::SignSplit, EstimatorKind::Hypotheses], estimator: EstimatorKind::Corrected };
 
 impl Recipe {
-    /// The filters to choose from for a body that rests at times, or never. Phase histories take several times as long to
+    /// Returns the filters to choose from, for a body that sometimes rests or never does. Phase histories take several times as long to
     /// calibrate.
     pub(crate) fn candidates(&self, rests: bool) -> &'static [EstimatorKind] {
         if rests { self.filters } else { self.filters.get(..1).unwrap_or(self.filters) }

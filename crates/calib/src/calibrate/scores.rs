@@ -3,7 +3,7 @@ use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 use crate::calibrate::left_out::REFERENCE_SD;
 use ohmstrain_sensor::Scores;
 
-/// Errors above this share of full scale, for this long, s, are no inaccuracy: the estimate follows another solution.
+/// Error, as a fraction of full scale, and duration, s, beyond which the estimate is taken to follow another solution.
 const WRONG_BRANCH: (f64, f64) = (0.2, 2.0);
 
 /// One scored row.
@@ -19,7 +19,7 @@ pub struct ScoredRow {
     pub sd: Option<f64>,
 }
 
-/// Scores rows; `None` if there is none. Rows with an unknown truth are passed over.
+/// Scores rows; `None` if there are none. Rows without a true strain are skipped.
 #[must_use]
 pub fn score(rows: &[ScoredRow]) -> Option<Scores> {
     let rows: Vec<&ScoredRow> = rows.iter().filter(|row| row.truth.is_finite()).collect();
@@ -56,12 +56,12 @@ pub fn score(rows: &[ScoredRow]) -> Option<Scores> {
     })
 }
 
-/// Returns the scores if errors have a value in percent of full scale; `None` if the truth is constant or an estimate is NaN.
+/// Returns the scores if their errors are finite in percent of full scale; `None` if the truth is constant or an estimate is NaN.
 pub(crate) fn score_of_full_scale(rows: &[ScoredRow]) -> Option<Scores> {
     score(rows).filter(|scores| scores.rmse_percent_fs.is_finite())
 }
 
-/// Share of the time between the first and the last row.
+/// Returns the share of the time between the first and the last row in which the estimate follows another solution.
 fn wrong_branch(rows: &[&ScoredRow], full_scale: f64) -> f64 {
     let wrong = |row: &ScoredRow| (row.strain - row.truth).abs() > WRONG_BRANCH.0 * full_scale;
     let (mut total, mut since) = (0.0, None);
@@ -123,7 +123,7 @@ mod tests {
         assert_eq!(score(&rows).unwrap().wrong_branch, 2.0 / 40.0);
     }
 
-    /// Zero error over zero full scale is no number, and neither is what an estimate that is none leaves.
+    /// Neither zero error over zero full scale nor an error of a NaN estimate is a number.
     #[test]
     fn there_is_no_percentage_of_a_constant() {
         let row = |k: u32, truth: f64, strain: f64| ScoredRow { time_s: f64::from(k), truth, strain, sd: None };

@@ -8,17 +8,17 @@ use crate::samples::Samples;
 use crate::sd_scale::Z_95;
 use ohmstrain_sensor::SettlingParams;
 
-/// Holds shorter than this share of the longest are left out: they end before the others.
+/// Minimum duration of a hold, as a fraction of the longest. Shorter ones end before the others.
 const LEAST_SHARE: f64 = 1.0 / 3.0;
-/// Least number of holds: one hold carries no information on the next one.
+/// Minimum number of holds: one hold carries no information on the next one.
 const FEWEST_HOLDS: usize = 2;
-/// Rows of a hold are looked at from its first seconds to these before its end, in equal steps of the logarithm of time.
+/// Span of the rows used of a hold: from this many seconds after its start to this many before its end, in equal steps of log time.
 const FIRST_S: f64 = 2.0;
 const BEFORE_END_S: f64 = 10.0;
 const ROWS: u32 = 12;
-/// Two or three holds tell a deviation badly, but not that badly.
+/// Largest widening factor: two or three holds determine a standard deviation poorly, but not as poorly as Student's t says.
 const MOST_WIDENED: f64 = 3.0;
-/// Ratios of the deviation that grows with the relaxation to the one that does not: none, and 30 from 0.1 to 100.
+/// Ratios tried of the standard deviation that grows with the relaxation to the constant one: 0, and from 0.1 to 100 in 30 steps.
 const RATIOS: (u32, f64, f64) = (30, 0.1, 100.0);
 
 /// A row of a hold.
@@ -33,7 +33,7 @@ struct Fall {
 pub(crate) struct LongHolds {
     longest_s: f64,
     count: usize,
-    /// Rows of each recording that are looked at, in order.
+    /// Rows used of each recording, in order.
     rows: Vec<Vec<usize>>,
     /// Their readings minus the last one of their hold.
     read: Vec<Vec<f64>>,
@@ -63,8 +63,8 @@ impl LongHolds {
 
     /// Estimates the settling; `None` if a filter fails. `build` makes filters with [`Self::law`].
     ///
-    /// The share is that of least squares, the deviations are those of maximum likelihood. Errors within one hold
-    /// are alike, so that the number of holds determines the uncertainty for another hold: Student's t.
+    /// The share is the least-squares estimate, the standard deviations are maximum-likelihood estimates. Errors within one hold are alike,
+    /// so the number of holds determines the uncertainty for another hold, by Student's t.
     pub(crate) fn settling(&self, left_out: &LeftOut, build: &Build) -> Option<SettlingParams> {
         let fall = |of: PredictedFall| {
             let place = self.rows[of.recording].binary_search(&of.row).ok()?;
@@ -75,7 +75,7 @@ impl LongHolds {
     }
 }
 
-/// Rows of a hold that have a reading, and by how much it is above the last one.
+/// Returns the rows of a hold that have a reading, with its difference from the last one.
 fn rows_of(hold: &Hold, samples: &Samples) -> Vec<(usize, f64)> {
     let start_s = samples.time_s[hold.rows.start];
     let latest = (hold.duration_s - BEFORE_END_S) / FIRST_S;
@@ -87,7 +87,7 @@ fn rows_of(hold: &Hold, samples: &Samples) -> Vec<(usize, f64)> {
     rows.into_iter().map(above).filter(|(_, above)| above.is_finite()).collect()
 }
 
-/// Share and deviations of the rows of `count` holds.
+/// Estimates share and standard deviations from the rows of `count` holds.
 fn likeliest(falls: &[Fall], count: usize, horizon_s: f64) -> SettlingParams {
     let squares: f64 = falls.iter().map(|fall| fall.predicted * fall.predicted).sum();
     let products: f64 = falls.iter().map(|fall| fall.read * fall.predicted).sum();
@@ -108,7 +108,7 @@ fn likeliest(falls: &[Fall], count: usize, horizon_s: f64) -> SettlingParams {
     SettlingParams { horizon_s, share, share_sd: ratio * sd / usual, sd }
 }
 
-/// Returns the factor on an interval whose deviation was estimated from that many holds.
+/// Returns the factor on an interval whose standard deviation was estimated from `count` holds.
 fn widened(count: usize) -> f64 {
     let count = count as f64;
     let quantile = |t: StudentsT| t.inverse_cdf(0.975);
@@ -120,7 +120,7 @@ fn widened(count: usize) -> f64 {
 mod tests {
     use super::{Fall, likeliest, widened};
 
-    /// Tests a share of two thirds of the predicted fall, with errors of 10 % of it in turn, and of 0.001 where no fall is predicted.
+    /// Tests a share of two thirds of the predicted fall, with errors of alternating sign: 10 % of the fall and 0.001, added in quadrature.
     #[test]
     fn share_and_deviations_are_found() {
         let fall = |k: u32| {
@@ -130,7 +130,7 @@ mod tests {
         };
         let falls: Vec<Fall> = (0..60).map(fall).collect();
         let found = likeliest(&falls, 1000, 300.0);
-        // A thousand holds widen by half a permille; the grid of ratios has steps of a quarter.
+        // A thousand holds widen by half a per mille; the grid of ratios has steps of a quarter.
         assert!((found.share - 2.0 / 3.0).abs() < 1e-12 && found.horizon_s == 300.0, "{found:?}");
         assert!((found.share_sd / 0.1 - 1.0).abs() < 0.15 && (found.sd / 1e-3 - 1.0).abs() < 0.15, "{found:?}");
     }
@@ -140,7 +140,7 @@ mod tests {
         let falls: Vec<Fall> = [0.01, 0.03].map(|read| Fall { read, predicted: 0.0 }).into();
         let found = likeliest(&falls, 1_000_000, 60.0);
         assert_eq!((found.share, found.share_sd), (0.0, 0.0));
-        // The quantile is good to 2e-5.
+        // The quantile is accurate to 2e-5.
         assert!((found.sd / 5e-4_f64.sqrt() - 1.0).abs() < 1e-4, "{found:?}");
     }
 

@@ -1,4 +1,4 @@
-//! Motions that a sensor was not seen in, as its law has them.
+//! Simulated motions and the law's readings of them, beyond those of the calibration.
 
 use std::f64::consts::{PI, TAU};
 
@@ -13,35 +13,35 @@ use crate::law::structure::LawFit;
 use crate::motion_stats::MotionStats;
 use ohmstrain_sensor::{CorrectionScale, RangeParams};
 
-/// Number of simulated motions, their length, and the beginning of each that is left out while low-passes forget it.
+/// Number of simulated motions, their duration, s, and the start of each that is dropped while low-passes forget it, s.
 const MOTIONS: usize = 24;
 const LASTS_S: f64 = 600.0;
 const FORGOTTEN_S: f64 = 20.0;
-/// Steps are no shorter than this: no low-pass of the features would see it. A motion has no fewer.
+/// Shortest time step, s (no low-pass of the features would resolve a shorter one), and least number of steps of a motion.
 const LEAST_STEP_S: f64 = 0.1;
 const LEAST_STEPS: usize = 200;
-/// The seed of all of them.
+/// Seed of all simulated motions.
 pub const SIMULATED_SEED: u64 = 1;
-/// Rows that are learned from.
+/// Target number of rows to learn from.
 const ROWS: usize = 4000;
-/// Spread of R₀ from one day to another, as a logarithm.
+/// Standard deviation of ln R₀ between days.
 const REST_SPREAD: f64 = 0.1;
 /// Correlation time of the law's error, s.
 const ERROR_TIME_S: f64 = 10.0;
-/// Mean speeds, in median and in fastest speeds of the calibration; the slowest in fastest ones at least.
+/// Slowest mean speed in median speeds of the calibration, fastest one in its fastest speeds, and least ratio of the two.
 const SLOWEST: f64 = 0.3;
 const FASTEST: f64 = 1.5;
 const LEAST_SPEED: f64 = 1e-3;
-/// Mean hold, s, and most of a sine, whose amplitude is no less than this share of the range.
+/// Mean hold, s, longest sine, s, and least amplitude of a sine as a fraction of the range.
 const HOLD_S: f64 = 5.0;
 const SINE_S: f64 = 120.0;
 const LEAST_AMPLITUDE: f64 = 0.01;
 
-/// Slowest and fastest, strain/s.
+/// Slowest and fastest mean speed, strain/s.
 type Speeds = (f64, f64);
 
-/// Rows of motions within the calibration's range, at its speeds and somewhat beyond, as the law has them; `step_s` is the usual time
-/// between readings.
+/// Returns rows of simulated motions within the calibrated range, at its speeds and somewhat beyond, with the law's readings; `step_s` is
+/// the usual time between readings.
 pub(crate) fn simulated_rows(
     fit: &LawFit,
     stats: &MotionStats,
@@ -69,7 +69,7 @@ pub(crate) fn simulated_rows(
     found
 }
 
-/// Half of all pieces are ramps, to anywhere or to an end of the range; the others are holds, and sines around any strain.
+/// Draws a motion. Half of its pieces are ramps, to anywhere or to an end of the range; the others are holds, and sines around any strain.
 fn motion(rng: &mut ChaCha12Rng, rows: usize, step_s: f64, range: RangeParams, speeds: Speeds) -> Vec<f64> {
     let mut uniform = |from: f64, to: f64| Uniform::new_inclusive(from, to).map_or(from, |any| any.sample(rng));
     let (low, high) = (range.lower, range.upper);
@@ -106,14 +106,14 @@ fn motion(rng: &mut ChaCha12Rng, rows: usize, step_s: f64, range: RangeParams, s
     strain
 }
 
-/// Even steps, none longer than this one.
+/// Returns even steps, none longer than `step`.
 fn ramp(from: f64, to: f64, step: f64) -> impl Iterator<Item = f64> {
     let steps = ((to - from).abs() / step) as usize + 1;
     (1..=steps).map(move |k| from + (to - from) * k as f64 / steps as f64)
 }
 
-/// Returns the law's readings, with an error like that on held-out blocks, and with an R₀ of another day. The law is exact for strain
-/// that changes linearly between rows.
+/// Returns the law's readings, with an error like that on held-out blocks and with the R₀ of another day. They are exact for strain that
+/// changes linearly between rows.
 fn readings(fit: &LawFit, strain: &[f64], step_s: f64, rng: &mut ChaCha12Rng) -> Vec<Option<Reading<f64>>> {
     let law = &fit.law;
     let gauge = law.gauge.to_model();
@@ -163,7 +163,7 @@ mod tests {
             assert_eq!(strain.len(), 6000);
             for pair in strain.windows(2) {
                 let rate = (pair[1] - pair[0]).abs() / step_s;
-                // A sine's fastest is π/2 of its mean.
+                // The largest speed of a sine is π/2 of its mean.
                 assert!(rate <= 0.5 * PI * speeds.1 + 1e-9, "{rate}");
                 holds += usize::from(rate == 0.0);
                 rows += 1;
@@ -171,13 +171,13 @@ mod tests {
             lowest = strain.iter().copied().fold(lowest, f64::min);
             highest = strain.iter().copied().fold(highest, f64::max);
         }
-        // They reach both ends, to rounding, and go no farther.
+        // The motions reach both ends of the range, to rounding, and stay within it.
         assert!((lowest - RANGE.lower).abs() < 1e-15 && (highest - RANGE.upper).abs() < 1e-15, "{lowest} {highest}");
         let share = holds as f64 / rows as f64;
         assert!((0.05..0.6).contains(&share), "{share}");
     }
 
-    /// A law without an error against its differential equations in a thousand steps a row.
+    /// Compares a law without error with its differential equations, integrated in a thousand steps a row.
     #[test]
     fn readings_are_the_laws() {
         let branch = BranchParams {
@@ -219,12 +219,12 @@ mod tests {
             let gauge = 2.0 * now - now * now + 3.0 * now.powi(3);
             expected.push(1.0 + gauge + viscosity_s * rate + relaxation[0] + relaxation[1]);
         }
-        // R₀ of another day is one factor on all of them.
+        // The R₀ of another day is a common factor of all readings.
         let rest = (1.0 + read[0].unwrap().value) / expected[0];
         assert!(rest != 1.0 && rest.ln().abs() < 5.0 * REST_SPREAD, "{rest}");
         for (read, expected) in read.iter().zip(expected) {
-            // Euler's steps leave half a step of the rate's change: 1e-4 s / 2 of 0.2 /s over 2 s; the gain at mid-strain
-            // stands for the mean over a row, where a slope of 0.7 changes it by 0.7 · 0.02 / 24 of 0.02 per row forgotten.
+            // Euler's method has an error of half a step of the rate's change: 1e-4 s / 2 of 0.2 /s over 2 s. The gain at mid-strain
+            // replaces the mean over a row; with a slope of 0.7 that changes it by 0.7 · 0.02 / 24 of 0.02 per row forgotten.
             assert!(((1.0 + read.unwrap().value) / rest - expected).abs() < 1e-4);
         }
     }

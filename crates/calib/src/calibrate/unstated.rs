@@ -5,11 +5,11 @@ use statrs::distribution::{ContinuousCDF, Normal};
 
 use crate::calibrate::scores::ScoredRow;
 
-/// Share of the rows that an interval is to hold.
+/// Share of the rows that an interval should cover.
 const LEVEL: f64 = 0.95;
 
-/// Returns the least standard deviation that has to be added to those of filter and smoother, as variances add, for their 95 %
-/// intervals to hold 95 % of the rows. Rows of an unknown truth are passed over.
+/// Returns the least standard deviation that, added in quadrature to those of filter and smoother, makes their 95 % intervals cover 95 % of
+/// the rows. Rows without a true strain are skipped.
 #[must_use]
 pub fn unstated(filter: &[ScoredRow], smoother: &[ScoredRow]) -> Unstated {
     Unstated { filter_sd: unstated_sd(filter), smoother_sd: unstated_sd(smoother) }
@@ -29,7 +29,7 @@ fn unstated_sd(rows: &[ScoredRow]) -> f64 {
 }
 
 impl ScoredRow {
-    /// Returns the row with a standard deviation added to that of its strain, as variances add.
+    /// Returns the row with a standard deviation added in quadrature to that of its strain.
     #[must_use]
     pub fn with_unstated(self, sd: f64) -> Self {
         Self { sd: self.sd.map(|stated| stated.hypot(sd)), ..self }
@@ -40,7 +40,7 @@ impl ScoredRow {
 mod tests {
     use super::{ScoredRow, unstated};
 
-    /// Nineteen errors of twenty lie within 1.96 deviations of 0.05 and 0.12 together, one far beyond.
+    /// Nineteen of twenty errors lie within 1.96 deviations of 0.05 and 0.12 combined, one far beyond.
     #[test]
     fn intervals_hold_nineteen_rows_of_twenty() {
         let row =

@@ -5,15 +5,14 @@ use crate::prior::Prior;
 use crate::samples::Samples;
 use ohmstrain_sensor::EstimatorKind;
 
-/// Share of the length of the other sensors' recordings from which on a recording may do without them.
+/// Duration of a recording, as a fraction of that of the other sensors' recordings, from which on it is also calibrated without them.
 const ALONE: f64 = 1.0 / 3.0;
 
-/// [`calibrate`](crate::calibrate) for one more sensor of a make that is known. A prior brings the law's structure; `structures`
-/// counts without one. Noise and motion start from it, and the filter that the others correct is the only candidate for a
-/// correction.
+/// Runs [`calibrate`](crate::calibrate) for one more sensor of a known make. A prior determines the law's structure; `structures` applies
+/// only without one. Noise and motion start from the prior, and the filter that the others correct is the only candidate for a correction.
 ///
-/// A recording a third as long as those of the others may tell more by itself: it is calibrated without the prior as well, and what
-/// errs less on quarters left out is taken.
+/// A recording a third as long as those of the others may contain more information than the prior. It is also calibrated without the prior,
+/// and the calibration with the smaller error on held-out quarters is returned.
 ///
 /// # Errors
 /// As [`calibrate`](crate::calibrate).

@@ -8,7 +8,7 @@ use super::moving_hold::MovingHold;
 use super::stretched::StretchedExponential;
 use super::tunnelling::TunnellingCurve;
 
-/// Most terms of a sum of exponentials: beyond four no recording tells them apart.
+/// Largest number of terms in a sum of exponentials: no recording separates more than four.
 const MOST_TERMS: usize = 4;
 
 /// The laws by name.
@@ -43,7 +43,7 @@ pub enum ClosedForm {
     Tunnelling,
 }
 
-/// The name that [`FromStr`] reads; `single` for the exponential that equations 8 and 9 are printed with.
+/// Writes the name that [`FromStr`] reads; `single` is the exponential with which equations 8 and 9 are printed.
 impl fmt::Display for ModulusShape {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -55,14 +55,14 @@ impl fmt::Display for ModulusShape {
 }
 
 impl ClosedForm {
-    /// True if the law has a modulus that can be chosen.
+    /// True if the modulus of the law can be chosen.
     #[must_use]
     pub const fn has_modulus(self) -> bool {
         matches!(self, Self::Eq8 | Self::Eq9 | Self::Eq8And9)
     }
 
-    /// The law, with a modulus for equations 8 and 9, whether the data have several speeds, and the reading at rest for
-    /// equation 2.
+    /// Returns the law. `modulus` applies to equations 8 and 9; `several_speeds` is true if the data have several speeds; `rest_reading`
+    /// applies to equation 2.
     #[must_use]
     pub fn law(self, modulus: ModulusShape, several_speeds: bool, rest_reading: f64) -> Box<dyn SeparableLaw> {
         match self {
@@ -80,7 +80,7 @@ impl ClosedForm {
     }
 }
 
-/// The name that [`FromStr`] reads.
+/// Writes the name that [`FromStr`] reads.
 impl fmt::Display for ClosedForm {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -123,7 +123,7 @@ impl FromStr for ClosedForm {
     }
 }
 
-/// `single`, `eq6`, or `eq7:N` with two terms if N is left out.
+/// Reads `single`, `eq6`, or `eq7:N` with two terms if N is left out.
 impl FromStr for ModulusShape {
     type Err = String;
 
@@ -137,7 +137,7 @@ impl FromStr for ModulusShape {
     }
 }
 
-/// A name and the N behind its colon; `None` if that is no number of terms.
+/// Splits a name from the N after its colon; `None` if N is not a valid number of terms.
 fn with_terms(text: &str) -> Option<(&str, Option<usize>)> {
     let Some((name, terms)) = text.split_once(':') else { return Some((text, None)) };
     let terms = terms.parse().ok().filter(|terms| (1..=MOST_TERMS).contains(terms))?;

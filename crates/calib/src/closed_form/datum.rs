@@ -5,7 +5,7 @@ pub struct Moment {
     pub elapsed_s: f64,
     /// Strain since the phase began, ε − ε_s: the `v t` of equation 8.
     pub travel: f64,
-    /// Mean strain rate v of the movement, 1/s, negative on release; in a hold that of the movement before.
+    /// Mean strain rate v of the movement, 1/s, negative on release; in a hold, that of the preceding movement.
     pub rate: f64,
     /// Strain ε.
     pub strain: f64,

@@ -2,12 +2,12 @@ use super::datum::{Datum, Moment};
 use super::law::{Derived, Parameter, SeparableLaw, Unit, sort_terms};
 use super::search::{Extent, Search};
 
-/// The modulus in equations 8 and 9, relative to its start.
+/// The modulus of equations 8 and 9, relative to its initial value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ModulusShape {
     /// Number of exponentials, at least 1.
     pub terms: usize,
-    /// True if it relaxes to a floor instead of to nothing; more than one term always has one.
+    /// True if it relaxes to a floor instead of to zero; more than one term always has a floor.
     pub floor: bool,
 }
 
@@ -28,9 +28,9 @@ pub struct Exponentials {
 enum Form {
     /// Rates λ and amplitudes r.
     Rates,
-    /// Time constants τ and amplitudes with this letter.
+    /// Time constants τ, and amplitudes named with this letter.
     Taus(&'static str),
-    /// One time constant, and the floor as a share of the amplitude.
+    /// One time constant, and the floor as a fraction of the amplitude.
     FloorShare,
 }
 
@@ -119,7 +119,7 @@ impl SeparableLaw for Exponentials {
     }
 }
 
-/// `exp(-t/τ)` and its derivative with respect to τ.
+/// Returns `exp(-t/τ)` and its derivative with respect to τ.
 pub(super) fn decay(elapsed_s: f64, tau_s: f64) -> (f64, f64) {
     let value = (-elapsed_s / tau_s).exp();
     (value, value * elapsed_s / (tau_s * tau_s))
@@ -128,7 +128,7 @@ pub(super) fn decay(elapsed_s: f64, tau_s: f64) -> (f64, f64) {
 /// Equation 2, Burgers: `R/R₀ - 1 = a + b exp(-t/τ) + c t`, fitted in units of the reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Burgers {
-    /// Reading at rest R₀, which the law does not tell.
+    /// Reading at rest R₀, which the law does not determine.
     pub rest_reading: f64,
 }
 

@@ -6,17 +6,16 @@ use super::projection::{Projection, least_squares};
 use super::search::{Extent, Search, starts};
 use super::statistics::ClosedFormFit;
 
-/// Starts that are followed to their minimum.
+/// Number of starts that are followed to their minimum.
 const FOLLOWED: usize = 12;
-/// Gauss-Newton steps at the end, at most.
+/// Largest number of final Gauss-Newton steps.
 const MOST_POLISHES: usize = 20;
-/// Largest step of those in units of the residual's norm.
+/// Largest of those steps, in units of the residual's norm.
 const SMALL_STEP: f64 = 1e-3;
 
-/// Fits a law to readings by least squares; the starts are found on a grid of the nonlinear parameters, and the best of
-/// several minima is taken.
+/// Fits a law to readings by least squares. Starts lie on a grid of the nonlinear parameters; of several minima the best is returned.
 ///
-/// The weights are eliminated at every step (variable projection), the rest is Levenberg-Marquardt.
+/// The weights are eliminated at every step (variable projection); the nonlinear parameters are found by Levenberg-Marquardt.
 ///
 /// # Errors
 /// Too few readings, or a law that is not finite at any start.
@@ -30,7 +29,7 @@ pub fn fit_closed_form(law: &dyn SeparableLaw, data: &[Datum]) -> Result<ClosedF
     problem.best_of(ranked.into_iter().map(|(_, start)| start))
 }
 
-/// A law, its data and where to look.
+/// A law, its data and the search ranges.
 struct Problem<'a> {
     law: &'a dyn SeparableLaw,
     data: &'a [Datum],
@@ -76,7 +75,7 @@ impl<'a> Problem<'a> {
         Ok(ClosedFormFit::new(self.law, self.data, &projection, &theta, &self.searches, converged))
     }
 
-    /// Levenberg-Marquardt from a start.
+    /// Runs Levenberg-Marquardt from a start.
     fn descend(&self, start: &[f64]) -> Result<End, ClosedFormError> {
         let mut point: Vec<f64> = start.iter().zip(&self.searches).map(|(x, search)| search.coordinate(*x)).collect();
         let mut descent = Descent::new(self);
@@ -88,8 +87,8 @@ impl<'a> Problem<'a> {
         Ok(End { cost, theta, converged })
     }
 
-    /// Gauss-Newton steps as long as they shrink. The descent stops where the *cost* is flat to rounding, half the digits
-    /// short of where its gradient is.
+    /// Takes Gauss-Newton steps for as long as they shrink. The descent stops where the *cost* is flat to rounding, which determines the
+    /// parameters to half as many digits as a zero gradient does.
     fn polish(&self, point: &mut [f64]) {
         let mut last = f64::INFINITY;
         for _ in 0..MOST_POLISHES {
@@ -102,7 +101,7 @@ impl<'a> Problem<'a> {
             }
             let Some((_, step)) = least_squares(&jacobian, &projection.residual) else { return };
             let size = (jacobian * &step).norm();
-            // The first step is small against the residual, or the descent has not ended in a minimum.
+            // If the first step is not small relative to the residual, the descent has not ended in a minimum.
             if !(size < 0.5 * last && size <= SMALL_STEP * projection.residual.norm()) {
                 return;
             }
@@ -118,7 +117,7 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// A problem as the optimiser wants it.
+/// A problem in the form that the optimiser needs.
 struct Descent<'a> {
     problem: &'a Problem<'a>,
     config: MPConfig,
@@ -135,7 +134,7 @@ impl<'a> Descent<'a> {
             side: MPSide::User,
             ..MPPar::new()
         });
-        // As far as doubles go: the cost is then flat to rounding.
+        // The tightest tolerance for doubles: the cost is then flat to rounding.
         let tight = 4.0 * f64::EPSILON;
         let config = MPConfig { ftol: tight, xtol: tight, gtol: tight, max_iter: 500, ..MPConfig::new() };
         Self { limits: limits.collect(), problem, config }

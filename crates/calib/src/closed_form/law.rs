@@ -25,7 +25,7 @@ pub enum Unit {
 }
 
 impl Unit {
-    /// Returns it as text, given the units of reading and strain, `1` for a pure number.
+    /// Returns the unit as text, given the units of reading and strain, `1` for a pure number.
     #[must_use]
     pub fn text(self, reading: &str, strain: &str) -> String {
         let over = |top: &str, bottom: &str| if bottom == "1" { top.to_string() } else { format!("{top}/{bottom}") };
@@ -52,7 +52,7 @@ pub struct Parameter {
 }
 
 impl Parameter {
-    /// A parameter of that name and unit.
+    /// Returns a parameter with this name and unit.
     #[must_use]
     pub fn new(name: impl Into<String>, unit: Unit) -> Self {
         Self { name: name.into(), unit }
@@ -92,16 +92,16 @@ pub trait SeparableLaw {
         0.0
     }
 
-    /// Brings terms that may change places into their order, fastest first.
+    /// Sorts interchangeable terms, fastest first.
     fn order(&self, _weights: &mut [f64], _theta: &mut [f64]) {}
 
-    /// Parameters that are derived from the fitted ones.
+    /// Returns the parameters that are derived from the fitted ones.
     fn derived(&self, _weights: &[f64], _theta: &[f64], _data: &[Datum]) -> Vec<Derived> {
         Vec::new()
     }
 }
 
-/// Reading of a law and its gradient with respect to all parameters, the linear ones first.
+/// Returns the reading of a law and its gradient with respect to all parameters, the linear ones first.
 ///
 /// ```
 /// use ohmstrain_calib::closed_form::{ClosedForm, ModulusShape, Moment, value_and_gradient};
@@ -146,7 +146,7 @@ pub enum ClosedFormError {
         /// Readings needed: two more than parameters.
         needed: usize,
     },
-    /// A number that is none.
+    /// A value that is not finite.
     #[error("the law is not finite on these readings")]
     NotFinite,
     /// The optimiser refused.

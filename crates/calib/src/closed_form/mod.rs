@@ -1,13 +1,13 @@
 //! Closed-form laws of the source paper, and of its field, fitted to single phases of a recording.
 //!
-//! A filter needs a law that holds over a whole session; these hold over one stretch, one hold or one release, and are
-//! what publications report. [`ClosedForm`] names them, [`fit_closed_form`] fits them without a start by hand.
+//! A filter needs a law that holds over a whole session. These hold over one stretch, one hold or one release, and are the ones that
+//! publications report. [`ClosedForm`] names them, [`fit_closed_form`] fits them without a manual start.
 //!
 //! # Policy
-//! - Every law is a weighted sum of functions that have few parameters of their own ([`SeparableLaw`]). The weights are
-//!   eliminated, so only time constants and their like are searched.
+//! - Every law is a weighted sum of functions that have few parameters of their own ([`SeparableLaw`]). The weights are eliminated, so the
+//!   search is only over time constants and similar parameters.
 //! - A parameter that the data do not determine has no standard error (`None`) instead of an enormous or a tiny one.
-//! - Standard errors take residuals for white. [`ClosedFormFit::residual_autocorrelation`] measures the deviation from that.
+//! - Standard errors assume white residuals. [`ClosedFormFit::residual_autocorrelation`] measures the deviation from that.
 
 mod catalogue;
 mod datum;

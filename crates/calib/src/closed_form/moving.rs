@@ -3,18 +3,18 @@ use super::exponentials::{ModulusShape, decay};
 use super::law::{Derived, Parameter, SeparableLaw, Unit, sort_terms};
 use super::search::{Extent, Search};
 
-/// Equation 8, a movement: `R = r₀ E(t) v t + v η + r₁`, E the modulus relative to its start.
+/// Equation 8, a movement: `R = r₀ E(t) v t + v η + r₁`, with the modulus E relative to its initial value.
 ///
-/// `v t` is taken as the measured travel, the same for a ramp at constant speed. The terms `r₀ Eᵢ` are separate weights.
+/// The measured travel replaces `v t`; for a ramp at constant speed they are the same. The terms `r₀ Eᵢ` are separate weights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Moving {
-    /// The modulus E(t); the paper's own has one term and no floor.
+    /// The modulus E(t); that of the paper has one term and no floor.
     pub modulus: ModulusShape,
-    /// True if the data have several speeds. At one speed `v η` and `r₁` cannot be told apart and are one parameter.
+    /// True if the data have several speeds. At one speed `v η` and `r₁` cannot be separated and form one parameter.
     pub several_speeds: bool,
 }
 
-/// The weights of `v η + r₁`, or the two of them.
+/// Returns the weight of `v η + r₁`, or a weight for each of the two.
 pub(super) fn intercept(several_speeds: bool) -> Vec<Parameter> {
     if several_speeds {
         vec![Parameter::new("eta", Unit::ReadingPerRate), Parameter::new("r1", Unit::Reading)]
@@ -23,7 +23,7 @@ pub(super) fn intercept(several_speeds: bool) -> Vec<Parameter> {
     }
 }
 
-/// Names of time constants: one is the paper's τ₀.
+/// Returns the time constants with their names; a single one is the paper's τ₀.
 pub(super) fn time_constants(terms: usize) -> Vec<Parameter> {
     let name = |i| if terms == 1 { "tau0_s".to_string() } else { format!("tau{i}_s") };
     (1..=terms).map(|i| Parameter::new(name(i), Unit::Second)).collect()
@@ -71,7 +71,7 @@ impl SeparableLaw for Moving {
         sort_terms(&mut weights[..theta.len()], theta);
     }
 
-    /// r₀ and, relative to the start, the floor: E₀/(1 + E₀) or E∞/(E∞ + ΣEᵢ).
+    /// Returns r₀ and the floor relative to the initial modulus: E₀/(1 + E₀) or E∞/(E∞ + ΣEᵢ).
     fn derived(&self, weights: &[f64], theta: &[f64], _data: &[Datum]) -> Vec<Derived> {
         let ModulusShape { terms, floor } = self.modulus;
         if !floor {

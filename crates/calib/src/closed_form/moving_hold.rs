@@ -9,8 +9,8 @@ use super::search::{Extent, Search};
 ///
 /// A [`Moment`] with a movement before it is in the hold.
 ///
-/// A modulus with a floor, `E = E∞ + Σ Eᵢ exp(-t/τᵢ)` with E(0) = 1, is fitted by `bᵢ = r₀′ Eᵢ`, `κ = r₀/r₀′` and
-/// `r₀ E∞`, which stay finite where the stiffness changes its sign on the way; r₀, r₀′ and Eᵢ are derived from them.
+/// A modulus with a floor, `E = E∞ + Σ Eᵢ exp(-t/τᵢ)` with E(0) = 1, is fitted by `bᵢ = r₀′ Eᵢ`, `κ = r₀/r₀′` and `r₀ E∞`, which stay
+/// finite if the stiffness changes sign during the search. r₀, r₀′ and Eᵢ are derived from them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MovingHold {
     /// The modulus E(t), shared.
@@ -19,7 +19,7 @@ pub struct MovingHold {
     pub several_speeds: bool,
 }
 
-/// `Σ bᵢ exp(-t/τᵢ)` and the fall of it since the start, with derivatives with respect to τ, then to b.
+/// `Σ bᵢ exp(-t/τᵢ)` and its change since the start, with derivatives with respect to τ, then to b.
 struct Relaxed {
     value: f64,
     value_slopes: Vec<f64>,
@@ -42,7 +42,7 @@ impl MovingHold {
             (out.value_slopes[terms + i], out.fall_slopes[terms + i]) = (left, gone);
         }
         if !self.modulus.floor {
-            // The stiffness is r₀ itself: one exponential without r₀′.
+            // Without a floor the stiffness is r₀ itself: one exponential, without r₀′.
             let (left, slope) = decay(elapsed_s, theta[0]);
             (out.value, out.value_slopes[0], out.value_slopes[1]) = (left, slope, 0.0);
         }
@@ -68,7 +68,7 @@ impl SeparableLaw for MovingHold {
     fn search(&self, extent: &Extent) -> Vec<Search> {
         let terms = self.modulus.terms;
         let mut out = extent.time_constants(terms);
-        // A share of 1 and more would have the resistance relax to nothing.
+        // At a fraction of 1 the resistance would relax to zero.
         out.extend((0..terms).map(|_| Search::between(-10.0, 1.0, &[0.1 / terms as f64])));
         out
     }
@@ -106,8 +106,8 @@ impl SeparableLaw for MovingHold {
         sort_terms(shares, taus);
     }
 
-    /// r₀, r₀′ and Eᵢ where the fit has them in products; the reading at the start of the hold, where it settles, and r₁′,
-    /// if there is but one hold.
+    /// Returns r₀, r₀′ and Eᵢ where the fit has them in products. For a single hold it adds the reading at its start, its settled reading,
+    /// and r₁′.
     fn derived(&self, weights: &[f64], theta: &[f64], data: &[Datum]) -> Vec<Derived> {
         let terms = self.modulus.terms;
         let (linear, size) = (weights.len(), weights.len() + theta.len());
@@ -159,7 +159,7 @@ impl SeparableLaw for MovingHold {
     }
 }
 
-/// A moment in the hold, if all holds follow the same movement.
+/// Returns a moment in the hold if all holds follow the same movement.
 fn only_hold(data: &[Datum]) -> Option<Moment> {
     let mut holds = data.iter().map(|datum| datum.at).filter(|at| at.before.is_some());
     let first = holds.next()?;

@@ -5,7 +5,7 @@ use crate::samples::filled_strain;
 
 use super::datum::{Datum, Moment, Movement};
 
-/// Readings of the given rows by the time since the first one alone, for laws of time.
+/// Returns the readings of the given rows over the time since the first one, for laws of time alone.
 #[must_use]
 pub fn whole_data(samples: &Samples, rows: Range<usize>) -> Vec<Datum> {
     let Some(&start_s) = samples.time_s.get(rows.start) else { return Vec::new() };
@@ -13,8 +13,8 @@ pub fn whole_data(samples: &Samples, rows: Range<usize>) -> Vec<Datum> {
     readings(samples, rows, at)
 }
 
-/// Readings of a movement. Missing reference values are bridged by straight lines; the rate is the slope of the line
-/// through travel over time.
+/// Returns the readings of a movement. Missing reference values are interpolated linearly; the rate is the
+/// least-squares slope of travel over time.
 #[must_use]
 pub fn moving_data(samples: &Samples, rows: Range<usize>) -> Vec<Datum> {
     if rows.is_empty() {
@@ -33,7 +33,7 @@ pub fn moving_data(samples: &Samples, rows: Range<usize>) -> Vec<Datum> {
     readings(samples, rows, at)
 }
 
-/// Readings of a hold; with the rows of the movement that led to it for the laws that need it.
+/// Returns the readings of a hold, with the movement that led to it for the laws that need it.
 #[must_use]
 pub fn hold_data(samples: &Samples, rows: Range<usize>, movement: Option<Range<usize>>) -> Vec<Datum> {
     if rows.is_empty() {
@@ -56,7 +56,7 @@ fn readings(samples: &Samples, rows: Range<usize>, at: impl Fn(usize) -> Moment)
     known.map(|k| Datum { at: at(k), reading: samples.reading[k] }).collect()
 }
 
-/// Slope of the straight line through values over time; zero for a single row.
+/// Returns the slope of the straight line through values over time; zero for a single row.
 fn slope(time_s: &[f64], values: &[f64]) -> f64 {
     let n = time_s.len() as f64;
     let (mean_s, mean) = (time_s.iter().sum::<f64>() / n, values.iter().sum::<f64>() / n);

@@ -4,12 +4,13 @@ use nalgebra::{DMatrix, DVector};
 use super::datum::Datum;
 use super::law::SeparableLaw;
 
-/// Singular values below this share of the largest are rounding: n ε with room for the thousands of rows of a recording.
+/// Singular values below this fraction of the largest are rounding: n ε, with a margin for the thousands of rows of a
+/// recording.
 const RANK: f64 = 1e-13;
 
 /// The law at some θ with the weights that fit best there.
 pub(super) struct Projection {
-    /// The weights; the smallest ones where several fit alike.
+    /// The weights; if several sets fit equally well, those of least norm.
     pub weights: DVector<f64>,
     /// Reading minus law.
     pub residual: DVector<f64>,
@@ -52,13 +53,13 @@ impl Projection {
         Some(Self { weights, residual, basis, slopes, range })
     }
 
-    /// Sum of squared residuals.
+    /// Returns the sum of squared residuals.
     pub fn cost(&self) -> f64 {
         self.residual.norm_squared()
     }
 
-    /// Derivative of the residual with respect to θ while the weights follow, without the term that vanishes with the
-    /// residual; its gradient of the cost is exact.
+    /// Returns the derivative of the residual with respect to θ with the weights eliminated, without the term that
+    /// vanishes with the residual. The gradient of the cost that follows from it is exact.
     ///
     /// Source: Kaufman, *BIT* 15 (1975) 49; Golub & Pereyra, *Inverse Problems* 19 (2003) R1.
     pub fn jacobian(&self) -> DMatrix<f64> {
@@ -66,8 +67,8 @@ impl Projection {
     }
 }
 
-/// Orthonormal columns that span the basis, and the weights. QR first, so that the SVD is of a small matrix; columns are
-/// scaled to length one, so that units do not decide about the rank.
+/// Returns orthonormal columns that span the basis, and the weights. QR first keeps the matrix of the SVD small;
+/// columns are scaled to unit length, so that units do not affect the rank.
 pub(super) fn least_squares(basis: &DMatrix<f64>, response: &DVector<f64>) -> Option<(DMatrix<f64>, DVector<f64>)> {
     let length = |column: f64| if column > 0.0 { column } else { 1.0 };
     let scale = DVector::from_iterator(basis.ncols(), basis.column_iter().map(|column| length(column.norm())));
@@ -79,7 +80,7 @@ pub(super) fn least_squares(basis: &DMatrix<f64>, response: &DVector<f64>) -> Op
     let svd = r.svd(true, true);
     let (left, right) = (svd.u?, svd.v_t?);
     let rank = svd.singular_values.iter().filter(|value| **value > RANK * svd.singular_values[0]).count();
-    // Singular values come in descending order.
+    // Singular values are in descending order.
     let range = product(&q, left.columns(0, rank));
     let mut inner = range.tr_mul(response);
     for (value, singular) in inner.iter_mut().zip(svd.singular_values.iter()) {

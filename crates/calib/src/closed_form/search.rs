@@ -1,11 +1,11 @@
 use super::datum::Datum;
 use crate::order::median;
 
-/// Points per time constant on the grid of starts.
+/// Number of points per time constant on the grid of starts.
 const GRID: usize = 8;
-/// Shortest time constant, in steps between readings: after three steps nothing of it is left.
+/// Shortest time constant, in steps between readings; three steps later nothing of it is left.
 const SHORTEST_STEPS: f64 = 0.3;
-/// Longest time constant, in durations: the bend of the exponential is then 1/60 of its fall.
+/// Longest time constant, in durations; the curvature of the exponential is then 1/60 of its fall.
 const LONGEST_DURATIONS: f64 = 30.0;
 
 /// Extent of the data.
@@ -33,10 +33,10 @@ impl Extent {
         }
     }
 
-    /// Returns the search ranges of `count` time constants, s, that may change places.
+    /// Returns the search ranges of `count` interchangeable time constants, s.
     #[must_use]
     pub fn time_constants(&self, count: usize) -> Vec<Search> {
-        // A start beyond the duration or below the step would begin where the data say little.
+        // Starts beyond the duration or below the step would lie where the data carry little information.
         let (first, last) = (self.step_s.ln(), self.duration_s.max(2.0 * self.step_s).ln());
         let starts: Vec<f64> =
             (0..GRID).map(|i| (first + (last - first) * (i as f64 + 0.5) / GRID as f64).exp()).collect();
@@ -74,28 +74,28 @@ pub struct Search {
     pub logarithmic: bool,
     /// Values to start from, ascending.
     pub starts: Vec<f64>,
-    /// True if it may change places with the parameter before, so that only starts above that one's are tried.
+    /// True if it is interchangeable with the preceding parameter, so that only starts above that one's are tried.
     pub above_previous: bool,
 }
 
 impl Search {
-    /// A parameter that may have either sign.
+    /// Returns the search range of a parameter that may have either sign.
     #[must_use]
     pub fn between(low: f64, high: f64, starts: &[f64]) -> Self {
         Self { low, high, logarithmic: false, starts: starts.to_vec(), above_previous: false }
     }
 
-    /// The coordinate that the optimiser moves.
+    /// Returns the coordinate that the optimiser varies.
     pub(super) fn coordinate(&self, value: f64) -> f64 {
         if self.logarithmic { value.ln() } else { value }
     }
 
-    /// The value at a coordinate, and its derivative.
+    /// Returns the value at a coordinate, and its derivative.
     pub(super) fn value_and_slope(&self, coordinate: f64) -> (f64, f64) {
         if self.logarithmic { (coordinate.exp(), coordinate.exp()) } else { (coordinate, 1.0) }
     }
 
-    /// True if a value stands at a limit, as far as the optimiser's steps resolve it.
+    /// True if a value is at a limit, to the resolution of the optimiser's steps.
     pub(super) fn at_limit(&self, value: f64) -> bool {
         let (low, high, x) = (self.coordinate(self.low), self.coordinate(self.high), self.coordinate(value));
         (x - low).min(high - x) <= 1e-6 * (high - low)

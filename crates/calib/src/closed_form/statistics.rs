@@ -5,26 +5,26 @@ use super::law::{Parameter, SeparableLaw};
 use super::projection::Projection;
 use super::search::Search;
 
-/// Threshold on a singular value, as a share of the largest, below which the data do not determine its direction: the square root of
-/// the rounding error, beyond which the variance itself is rounding.
+/// Threshold on a singular value, as a fraction of the largest, below which the data do not determine its direction: the square root of the
+/// rounding error. Below it the variance itself is rounding.
 const TOLD: f64 = 1.5e-8;
-/// A parameter has no standard error if its share of an untold direction is above this.
+/// Component of a parameter along an undetermined direction above which it has no standard error.
 const INVOLVED: f64 = 1e-3;
 
-/// A parameter, or what follows from parameters, with its uncertainty.
+/// A parameter, or a quantity derived from parameters, with its uncertainty.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Estimated {
     /// Name and unit.
     pub parameter: Parameter,
     /// Its value.
     pub value: f64,
-    /// Its standard error; `None` if the data do not tell the parameter, or if it stands at a limit of its search.
+    /// Its standard error; `None` if the data do not determine the parameter, or if it is at a limit of its search.
     pub standard_error: Option<f64>,
-    /// True if it stands at a limit of its search: the data ask for a value beyond.
+    /// True if it is at a limit of its search: the best value is beyond.
     pub at_limit: bool,
 }
 
-/// A fitted law and how well it fits.
+/// A fitted law with its goodness of fit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ClosedFormFit {
     /// The parameters, linear ones first.
@@ -33,7 +33,7 @@ pub struct ClosedFormFit {
     pub derived: Vec<Estimated>,
     /// Covariance of the parameters, `σ² (JᵀJ)⁻¹`; NaN where a parameter has no standard error.
     pub covariance: DMatrix<f64>,
-    /// Readings fitted.
+    /// Number of readings fitted.
     pub readings: usize,
     /// Reading minus law, one per reading.
     pub residuals: Vec<f64>,
@@ -49,17 +49,17 @@ pub struct ClosedFormFit {
     pub aicc: f64,
     /// Bayesian criterion, with `k ln n` in place of `2 k`.
     pub bic: f64,
-    /// Correlation of neighbouring residuals. Near 0, standard errors are right; near 1 they are too small, by
-    /// about `√((1 + ρ) / (1 - ρ))`.
+    /// Correlation of neighbouring residuals. Near 0, standard errors are right; near 1, they are too small by a factor of about
+    /// `√((1 + ρ) / (1 - ρ))`.
     pub residual_autocorrelation: f64,
-    /// Condition of the Jacobian with columns of length one.
+    /// Condition number of the Jacobian with columns of unit length.
     pub condition: f64,
     /// True if the optimiser reported convergence.
     pub converged: bool,
 }
 
 impl ClosedFormFit {
-    /// A parameter or derived quantity by name.
+    /// Returns a parameter or derived quantity by name.
     #[must_use]
     pub fn get(&self, name: &str) -> Option<&Estimated> {
         self.parameters.iter().chain(&self.derived).find(|estimated| estimated.parameter.name == name)
@@ -126,14 +126,14 @@ impl ClosedFormFit {
     }
 }
 
-/// `(JᵀJ)⁻¹` by QR and SVD, and what of it is known.
+/// `(JᵀJ)⁻¹` by QR and SVD, NaN where it is not determined, and the condition number.
 struct Inverse {
     covariance: DMatrix<f64>,
     condition: f64,
 }
 
 impl Inverse {
-    /// Columns at a limit are left out: the others are then conditional on it.
+    /// Inverts without the columns at a limit; the variances of the others are conditional on those limits.
     fn new(jacobian: &DMatrix<f64>, left_out: &[bool]) -> Self {
         let size = jacobian.ncols();
         let unknown = DMatrix::from_element(size, size, f64::NAN);
@@ -167,7 +167,7 @@ fn known(variance: f64) -> Option<f64> {
     variance.is_finite().then(|| variance.max(0.0).sqrt())
 }
 
-/// Variance of a quantity with this gradient; what it does not depend on need not be known.
+/// Returns the variance of a quantity with this gradient. Parameters on which it does not depend may be undetermined.
 fn carried(covariance: &DMatrix<f64>, gradient: &[f64]) -> f64 {
     let mut sum = 0.0;
     for (a, slope_a) in gradient.iter().enumerate().filter(|(_, slope)| **slope != 0.0) {

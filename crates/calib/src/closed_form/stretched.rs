@@ -17,7 +17,7 @@ impl SeparableLaw for StretchedExponential {
 
     fn search(&self, extent: &Extent) -> Vec<Search> {
         let mut searches = extent.time_constants(1);
-        // Below 0.05 the law is a logarithm of time, above 2 faster than a Gaussian: neither is a relaxation.
+        // Below 0.05 the law is a logarithm of time, above 2 it falls faster than a Gaussian: neither is a relaxation.
         searches.push(Search::between(0.05, 2.0, &[0.3, 0.5, 0.8, 1.0]));
         searches
     }

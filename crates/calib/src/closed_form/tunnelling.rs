@@ -4,8 +4,8 @@ use super::search::{Extent, Search};
 
 /// Tunnelling between particles whose gaps grow with strain: `R₀ (1 + C ε) exp(A ε + W ε²)`, C ≥ 0.
 ///
-/// Source: Zhang, Pan, Zheng & Yi, *J. Polym. Sci. B* 38 (2000) 2739, with the exponent in powers of strain; the
-/// gauge curve `ohmstrain_model::Gauge::Tunnelling` for data.
+/// Source: Zhang, Pan, Zheng & Yi, *J. Polym. Sci. B* 38 (2000) 2739, with the exponent in powers of strain. It is the
+/// gauge curve `ohmstrain_model::Gauge::Tunnelling`, fitted to data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TunnellingCurve;
 

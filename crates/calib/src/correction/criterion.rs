@@ -4,19 +4,19 @@ use crate::dense::inverse_diagonal;
 
 use super::gaussian_process::{BLOCKS, BlockLeftOut, GaussianProcess};
 
-/// Criterion that settings are chosen by: the larger, the better. Rows are closer in time than the correlation time of their errors,
-/// so that marginal likelihood alone mistakes the common errors of neighbours for a function of the inputs: little noise, short length
+/// Criterion for choosing settings; larger is better. Rows are closer in time than the correlation time of their errors. Marginal
+/// likelihood alone would therefore take the shared errors of neighbours for a function of the inputs, with little noise and short length
 /// scales. A held-out block has no such neighbours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Criterion {
-    /// The densities of rows without their blocks, each by itself.
+    /// Density of each row by itself, predicted without its block.
     LeftOut,
-    /// The geometric mean of that, of the joint densities of the blocks, and of marginal likelihood.
+    /// Geometric mean of that density, of the joint densities of the blocks, and of marginal likelihood.
     LeftOutAndEvidence,
 }
 
 impl Criterion {
-    /// Its negative logarithm, up to a constant; none if a covariance is not positive definite.
+    /// Returns its negative logarithm, up to a constant; `None` if a covariance is not positive definite.
     pub(super) fn cost(self, process: &GaussianProcess) -> Option<f64> {
         let left_out = LeftOutCosts::new(process)?;
         let of_all = || (left_out.rows + left_out.blocks + process.negative_log_evidence()) / 3.0;
@@ -24,7 +24,7 @@ impl Criterion {
     }
 }
 
-/// Negative logarithms of densities, up to a constant, each with the prior variance that makes it least.
+/// Negative logarithms of densities, up to a constant, each with the prior variance that minimises it.
 struct LeftOutCosts {
     rows: f64,
     blocks: f64,
@@ -45,11 +45,11 @@ impl LeftOutCosts {
     }
 }
 
-/// Normal densities whose covariances share a factor.
+/// Sums of normal densities whose covariances have a common factor.
 #[derive(Clone, Copy, Default)]
 struct NormalSum {
     count: usize,
-    /// Sum of squared errors over the root of their covariance.
+    /// Sum of squared errors in units of their covariance.
     squares: f64,
     half_log_determinants: f64,
 }

@@ -9,9 +9,9 @@ pub(crate) struct Examples<'a, const D: usize> {
     pub strain: &'a [f64],
     pub time_s: &'a [f64],
     pub limits: RangeParams,
-    /// Standard deviation of the strains themselves, which errors do not show.
+    /// Standard deviation of the strains themselves, which the errors do not show.
     pub reference_sd: f64,
-    /// All rows of several recordings, which these stand for; `None` if there are no others.
+    /// All rows of several recordings, which these rows represent; `None` if there are no others.
     pub all: Option<AllRows<'a, D>>,
 }
 

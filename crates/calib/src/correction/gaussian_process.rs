@@ -3,13 +3,13 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use ohmstrain_ekf::correction::kernel;
 use ohmstrain_sensor::correction::relevance;
 
-/// Blocks of rows that are left out in turn.
+/// Number of blocks that are left out in turn.
 pub(super) const BLOCKS: usize = 5;
 /// White noise beside the noise that is correlated in time, as a share of its variance.
 pub(super) const WHITE: f64 = 0.09;
-/// Variance that keeps the equations regular, in variances of the targets.
+/// Variance that keeps the equations regular, in units of the targets' variance.
 const JITTER: f64 = 1e-6;
-/// Smallest pivot of the inducing rows, as a share of the prior variance, that adds information.
+/// Smallest pivot of an inducing row that still adds information, as a fraction of the prior variance.
 const SMALLEST_PIVOT: f64 = 1e-6;
 
 /// Hyper-parameters of a Gaussian process.
@@ -36,39 +36,39 @@ pub(crate) struct GaussianProcess {
     /// Mean and standard deviation of the targets.
     pub centre: f64,
     pub size: f64,
-    /// Prior variance where the kernel is 1, in variances of the targets: the one that explains them best.
+    /// Prior variance where the kernel is 1, in units of the targets' variance; the maximum-likelihood value.
     pub scale: f64,
-    /// Variance of the noise, in those of the prior.
+    /// Variance of the noise, in units of the prior variance.
     pub noise: f64,
-    /// Kernels of the rows with each other, in the lower triangle.
+    /// Kernels between the rows, lower triangle.
     kernel: DMatrix<f64>,
     covariance: Cholesky<f64, Dyn>,
     weights: DVector<f64>,
     targets: DVector<f64>,
 }
 
-/// Prediction of a row by the process without the row's block, in the unit of the target.
+/// Prediction of a row by the process conditioned without the row's block, in the unit of the target.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LeftOutRow {
     pub mean: f64,
-    /// Share of the prior variance that is unknown.
+    /// Fraction of the prior variance that is unexplained.
     pub unknown: f64,
     /// Prior variance.
     pub prior: f64,
 }
 
-/// A block without its own rows.
+/// Prediction of a block from the other rows.
 pub(super) struct BlockLeftOut {
     /// Its first row.
     pub start: usize,
-    /// Targets less the prediction from the other rows, in their standard deviations.
+    /// Targets minus the prediction from the other rows, in standard deviations of the targets.
     pub errors: DVector<f64>,
     /// The inverse of their covariance, for a prior variance of 1.
     pub precision: Cholesky<f64, Dyn>,
 }
 
 impl TrainingSet<'_> {
-    /// `Σ (xᵢ - xᵢ')²/2ℓᵢ²` for all pairs of rows, in the lower triangle.
+    /// Returns `Σ (xᵢ - xᵢ')²/2ℓᵢ²` for all pairs of rows, lower triangle.
     pub(super) fn half_squares(self, lengths: &[f64]) -> DMatrix<f64> {
         let relevance: Vec<f64> = lengths.iter().map(|length| relevance(*length)).collect();
         let apart = |(a, b): (&f64, &f64)| (a - b).powi(2);
@@ -79,7 +79,7 @@ impl TrainingSet<'_> {
         lower_triangle(self.inputs.len(), sum)
     }
 
-    /// Kernels of the rows with each other, in the lower triangle, of sums by [`half_squares`](Self::half_squares).
+    /// Returns the kernels between the rows, lower triangle, from sums by [`half_squares`](Self::half_squares).
     pub(super) fn kernel(self, sums: &DMatrix<f64>) -> DMatrix<f64> {
         lower_triangle(self.inputs.len(), |i, j| kernel(sums[(i, j)], self.inputs[i][0] * self.inputs[j][0]))
     }
@@ -91,7 +91,7 @@ pub(super) struct Noise {
     pub sd: f64,
     /// Correlation time, s.
     pub time_s: f64,
-    /// Covariance, in variances of the targets, in the lower triangle.
+    /// Covariance, in units of the targets' variance, lower triangle.
     covariance: DMatrix<f64>,
 }
 
@@ -113,7 +113,7 @@ impl GaussianProcess {
         Self::of_kernel(training.targets, kernel, &Noise::new(training, params.noise, params.noise_time_s))
     }
 
-    /// The same, of kernels by [`TrainingSet::kernel`].
+    /// Conditions a process on rows, given kernels by [`TrainingSet::kernel`].
     pub(super) fn of_kernel(targets: &[f64], kernel: DMatrix<f64>, noise: &Noise) -> Option<Self> {
         let n = targets.len();
         let centre = targets.iter().sum::<f64>() / n as f64;
@@ -133,18 +133,18 @@ impl GaussianProcess {
         0.5 * n * self.scale.ln() + half_log_determinant
     }
 
-    /// Weights of the rows, in the unit of the targets.
+    /// Returns the weights of the rows, in the unit of the targets.
     pub(crate) fn weights(&self) -> impl Iterator<Item = f64> {
         self.weights.iter().map(|weight| weight * self.size)
     }
 
-    /// Variance for which the kernel 1 stands, in the squared unit of the targets.
+    /// Returns the variance that corresponds to a kernel of 1, in the squared unit of the targets.
     pub(crate) fn variance(&self) -> f64 {
         self.scale * self.size * self.size
     }
 
-    /// Predicts every row without the row's block, in closed form from the inverse covariance (Rasmussen &
-    /// Williams, *Gaussian Processes for Machine Learning*, 2006, eq. 5.12, for blocks). Blocks are of rows in order.
+    /// Predicts every row without the row's block, in closed form from the inverse covariance (Rasmussen & Williams, *Gaussian Processes
+    /// for Machine Learning*, 2006, eq. 5.12, for blocks). Blocks are of consecutive rows.
     pub(crate) fn left_out(&self, blocks: usize) -> Option<Vec<LeftOutRow>> {
         let n = self.targets.len();
         let mut rows = Vec::with_capacity(n);
@@ -168,8 +168,8 @@ impl GaussianProcess {
         let triangle = self.covariance.l_dirty();
         let mut inverse: DMatrix<f64> = DMatrix::zeros(n, n);
         let mut left_out = Vec::with_capacity(blocks);
-        // The inverse of the triangle grows from its end: of a block's columns nothing is above the block, and what is below takes
-        // the inverse that there is. Products of matrices are several times as fast as triangular equations.
+        // The inverse of the triangle is built from its end. The columns of a block are zero above the block; below it they follow from the
+        // part of the inverse that is already known. Matrix products are several times as fast as triangular solves.
         for block in (0..blocks).rev() {
             let (start, end) = (block * n / blocks, (block + 1) * n / blocks);
             let (len, later) = (end - start, n - end);
@@ -185,8 +185,8 @@ impl GaussianProcess {
         Some(left_out)
     }
 
-    /// Rows of the upper triangle W, one after the other: |W k|² is the share of the prior variance that all rows explain where their
-    /// kernels are projected onto those of these inducing rows, k (Nyström).
+    /// Returns the rows of the upper triangle W, one after the other: |W k|² is the fraction of the prior variance that all rows explain if
+    /// their kernels are projected onto those of the inducing rows, k (Nyström).
     pub(crate) fn explained(&self, inducing: &[usize]) -> Option<Vec<f64>> {
         let m = inducing.len();
         let mut kernel = self.kernel.clone();
@@ -200,7 +200,7 @@ impl GaussianProcess {
     }
 }
 
-/// Kernels of rows with each other.
+/// Returns the kernels between rows.
 pub(super) fn kernel_of(rows: &[Vec<f64>], settings: &Settings) -> DMatrix<f64> {
     let inputs: Vec<&[f64]> = rows.iter().map(Vec::as_slice).collect();
     let training = TrainingSet { inputs: &inputs, targets: &[], time_s: &[] };
@@ -209,7 +209,7 @@ pub(super) fn kernel_of(rows: &[Vec<f64>], settings: &Settings) -> DMatrix<f64> 
     kernel
 }
 
-/// Builds the lower triangle of an n × n matrix; zeros are above it.
+/// Builds the lower triangle of an n × n matrix, with zeros above it.
 pub(super) fn lower_triangle(n: usize, entry: impl Fn(usize, usize) -> f64) -> DMatrix<f64> {
     let mut matrix = DMatrix::zeros(n, n);
     for (j, mut column) in matrix.column_iter_mut().enumerate() {
@@ -218,8 +218,8 @@ pub(super) fn lower_triangle(n: usize, entry: impl Fn(usize, usize) -> f64) -> D
     matrix
 }
 
-/// Selects the rows that carry most information on all others, by a pivoted Cholesky decomposition of a kernel (Fine & Scheinberg, *J. Mach.
-/// Learn. Res.* 2 (2001) 243): at most `most`, fewer if the others add nothing.
+/// Selects the rows that carry most information on all others, by a pivoted Cholesky decomposition of a kernel (Fine & Scheinberg, *J.
+/// Mach. Learn. Res.* 2 (2001) 243): at most `most` rows, fewer if the others add no information.
 pub(crate) fn inducing_rows(kernel: &DMatrix<f64>, most: usize) -> Vec<usize> {
     let n = kernel.nrows();
     let mut left = kernel.diagonal();

@@ -21,9 +21,9 @@ use gaussian_process::{inducing_rows, kernel_of};
 use prepared::{Choosing, Conditioned, seen};
 pub(crate) use prepared::{Chosen, Prepared};
 
-/// Significant digits of weights: kernels of a few hundred rows have conditions up to 1e6, and predictions are to have six digits.
+/// Significant digits of weights: kernels of a few hundred rows have condition numbers up to 1e6, and predictions need six digits.
 const WEIGHT_DIGITS: usize = 12;
-/// Significant digits of what inducing rows explain, a share of the variance.
+/// Significant digits of the explained fraction of the variance.
 const EXPLAINED_DIGITS: usize = 9;
 /// The processes of a corrector.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,7 +46,7 @@ impl Choices {
     }
 }
 
-/// The corrector of a filter, from examples, beside a process of simulated rows; `None` if there is nothing to learn from them.
+/// Learns the corrector of a filter from examples, beside a process of simulated rows; `None` if there is nothing to learn from them.
 pub(crate) fn filter_corrector(
     examples: Examples<FILTER_INPUTS>,
     simulated: &SimulatedParams,
@@ -55,14 +55,14 @@ pub(crate) fn filter_corrector(
     Choices::fit::<_, 0>(&prepared, &prepared.simulated_predictions(simulated))?.learned::<_, 0>(&prepared)
 }
 
-/// The same of a smoother, with its one-sided processes.
+/// Learns the corrector of a smoother, with its one-sided processes.
 pub(crate) fn smoother_corrector(examples: Examples<SMOOTHER_INPUTS>) -> Option<CorrectorParams> {
     let prepared = Prepared::new(examples);
     Choices::fit::<_, SIDES>(&prepared, &[])?.learned::<_, SIDES>(&prepared)
 }
 
 impl Choices {
-    /// Chooses the processes, S one-sided ones among them; `last` is mixed in last in every row, if given.
+    /// Chooses the processes, S one-sided ones among them. `last` is mixed into every row at the end, if given.
     pub(crate) fn fit<const D: usize, const S: usize>(prepared: &Prepared<D>, last: &[Gaussian<f64>]) -> Option<Self> {
         let chosen = |kind: ProcessKind| prepared.chosen(kind, Choosing::of_sides(S));
         let both = || rayon::join(|| chosen(ProcessKind::Direct), || chosen(ProcessKind::Residual));
@@ -73,7 +73,7 @@ impl Choices {
         Some(Self { sd_scale: of.scale_of::<_, S>(prepared, last)?, ..of })
     }
 
-    /// Returns the factor on the deviation of its processes' joint prediction.
+    /// Returns the factor on the standard deviation of the processes' joint prediction.
     fn scale_of<const D: usize, const S: usize>(&self, prepared: &Prepared<D>, last: &[Gaussian<f64>]) -> Option<f64> {
         let predicted = |kind: ProcessKind| prepared.left_out(kind, self.of(kind)?);
         let (direct, residual) = (predicted(ProcessKind::Direct)?, predicted(ProcessKind::Residual)?);
@@ -84,7 +84,7 @@ impl Choices {
         Some(prepared.scale_beside(&predicted, last))
     }
 
-    /// Conditions the processes on the examples; none if a covariance is not positive definite.
+    /// Conditions the processes on the examples; `None` if a covariance is not positive definite.
     pub(crate) fn learned<const D: usize, const S: usize>(&self, prepared: &Prepared<D>) -> Option<CorrectorParams> {
         let made = |kind: ProcessKind| prepared.conditioned(kind, self.of(kind)?);
         let (direct, residual) = (made(ProcessKind::Direct)?, made(ProcessKind::Residual)?);
@@ -124,7 +124,7 @@ impl Choices {
     }
 }
 
-/// A weight with the digits that are kept.
+/// Rounds a weight to the digits that are stored.
 fn weight(value: f64) -> f64 {
     significant(value, WEIGHT_DIGITS)
 }
@@ -139,7 +139,7 @@ fn input_scales<const D: usize>(scales: &[InputScale<f64>; D]) -> InputScales {
     }
 }
 
-/// All rows, these first.
+/// Returns all rows, the inducing ones first.
 fn inducing_first(inducing: &[usize], rows: usize) -> Vec<usize> {
     let others = (0..rows).filter(|row| !inducing.contains(row));
     inducing.iter().copied().chain(others).collect()

@@ -1,4 +1,4 @@
-//! Examples on the scale of their inputs, and the rows that what is learned from them is judged on.
+//! Examples on the scale of their inputs, and the rows on which the learned correction is judged.
 
 use std::ops::Range;
 
@@ -13,24 +13,23 @@ use super::sparse::{Population, Sums};
 use crate::order::extent;
 use crate::sd_scale::{joint_scale_of, sd_scale_up_to};
 
-/// Least prior variance of the strain after the direct process, and of the filter's error after the residual process, in
-/// variances of the strain. The targets' own variances, of a filter that has seen the rows, promise too much for other
-/// motions.
+/// Least prior variance of the strain given the direct process, and of the filter's error given the residual process, in units of the
+/// strain's variance. The filter has seen the rows, so the variances of the targets themselves would be too small for other motions.
 const LEAST_DIRECT: f64 = 0.5;
 const LEAST_RESIDUAL: f64 = 0.07;
-/// Multiples of all length scales, and noises in deviations of the targets, that are tried on recordings left out.
+/// Multiples of all length scales, and noises in standard deviations of the targets, tried on held-out recordings.
 const LENGTH_FACTORS: [f64; 3] = [1.0, 2.0, 4.0];
 const NOISES: [f64; 3] = [0.1, 0.3, 1.0];
-/// Widest factor on a process' deviation: block left out of recordings that hold still for long are worlds of their own.
+/// Largest factor on a process' standard deviation: held-out blocks of recordings with long holds have little in common with the others.
 const WIDEST_PROCESS: f64 = 3.0;
 
-/// A process, before it has seen rows.
+/// Settings of a process, before it is conditioned on rows.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Chosen {
-    /// Places of the inputs that it sees.
+    /// Indices of its inputs.
     pub inputs: Vec<usize>,
     pub settings: Settings,
-    /// Factor on its standard deviation, from blocks left out.
+    /// Factor on its standard deviation, from held-out blocks.
     pub sd_scale: f64,
 }
 
@@ -38,14 +37,14 @@ pub(crate) struct Chosen {
 #[derive(Clone, Copy)]
 pub(super) struct Choosing {
     pub(super) criterion: Criterion,
-    /// True if the factor on a process' deviation is the one that covers the worst block, or all of them together.
+    /// True if the factor on a process' standard deviation covers the worst block, false if it covers all blocks together.
     pub(super) covers_worst: bool,
 }
 
 impl Choosing {
-    /// Factors weigh members against each other; the mixture's own sees to its interval. Of a filter's two members one is not to be
-    /// silenced everywhere by a block that is a world of its own. A smoother has four, one of which is mostly better: there the
-    /// caution pays.
+    /// Factors weigh members against each other; the mixture has its own factor for its interval. A filter has two members, and a single
+    /// unusual block must not silence one of them everywhere. A smoother has four, one of which is usually better, so the caution pays
+    /// there.
     pub(super) const fn of_sides(sides: usize) -> Self {
         let is_smoother = sides > 0;
         let criterion = if is_smoother { Criterion::LeftOut } else { Criterion::LeftOutAndEvidence };
@@ -53,7 +52,7 @@ impl Choosing {
     }
 }
 
-/// Least prior variance of a process, in variances of the strain.
+/// Returns the least prior variance of a process, in units of the strain's variance.
 const fn least_variance(kind: ProcessKind) -> f64 {
     match kind {
         ProcessKind::Residual => LEAST_RESIDUAL,
@@ -61,7 +60,7 @@ const fn least_variance(kind: ProcessKind) -> f64 {
     }
 }
 
-/// Examples on the scale that their inputs have.
+/// Examples with standardised inputs.
 pub(crate) struct Prepared<'a, const D: usize> {
     pub(super) examples: Examples<'a, D>,
     pub(super) rows: Vec<[f64; D]>,
@@ -70,8 +69,8 @@ pub(crate) struct Prepared<'a, const D: usize> {
     pub(super) judged: Judged<'a, D>,
 }
 
-/// Rows that a correction is judged on, each by what was learned without its block: all rows of several recordings, or else the
-/// examples in fifths.
+/// Rows on which a correction is judged, each by what was learned without its block: all rows of several recordings, or else the examples
+/// in fifths.
 pub(super) struct Judged<'a, const D: usize> {
     /// Standardised inputs.
     pub(super) rows: Vec<[f64; D]>,
@@ -80,7 +79,7 @@ pub(super) struct Judged<'a, const D: usize> {
     pub(super) blocks: Vec<Range<usize>>,
 }
 
-/// Predictions of judged rows, mean and unknown share of the prior variance, and the variance of the noise.
+/// Predictions of the judged rows: mean, unexplained fraction of the prior variance, and variance of the noise.
 struct LeftOut {
     rows: Vec<LeftOutRow>,
     noise: f64,
@@ -110,7 +109,7 @@ impl<'a, const D: usize> Prepared<'a, D> {
         self.strain_variance * least_variance(kind)
     }
 
-    /// Calls `learn` with the examples of a process.
+    /// Calls `learn` with the training set of a process.
     fn with_training_set<X>(
         &self,
         (kind, places): (ProcessKind, &[usize]),
@@ -120,7 +119,7 @@ impl<'a, const D: usize> Prepared<'a, D> {
         learn(TrainingSet { inputs: &as_slices(&inputs), targets: &targets, time_s: self.examples.time_s })
     }
 
-    /// Sums over all rows of several recordings; `None` if there are not several.
+    /// Returns the sums over all rows of several recordings; `None` if there are not several.
     fn sums(&self, (kind, places): (ProcessKind, &[usize]), lengths: &[f64]) -> Option<Sums> {
         let AllRows { step_s, .. } = self.examples.all?;
         let (few, inputs) = (seen(places, &self.rows), seen(places, &self.judged.rows));
@@ -129,8 +128,8 @@ impl<'a, const D: usize> Prepared<'a, D> {
         Some(Sums::new(Population { few, inputs, targets: &targets, recordings, step_s }, lengths))
     }
 
-    /// Chooses a process: the relevance of its inputs by the examples, all length scales and the noise by recordings left out, where
-    /// there are several.
+    /// Chooses a process. The examples determine the relevance of its inputs; held-out recordings, if there are several, the common factor
+    /// on the length scales and the noise.
     pub(super) fn chosen(&self, kind: ProcessKind, by: Choosing) -> Option<Chosen> {
         let inputs = kind.places(D);
         let settings = self.with_training_set((kind, &inputs), |training| training.best_settings(by.criterion))?;
@@ -144,7 +143,7 @@ impl<'a, const D: usize> Prepared<'a, D> {
         Some(Chosen { sd_scale: sd_scale_up_to(&blocks, WIDEST_PROCESS), ..chosen })
     }
 
-    /// The multiple of all length scales and the noise that are best by recordings left out.
+    /// Returns the settings with the common factor on the length scales and the noise that are best on held-out recordings.
     fn best_of_recordings(&self, of: (ProcessKind, &[usize]), settings: &Settings) -> Option<Settings> {
         let mut best: Option<(f64, Settings)> = None;
         for factor in LENGTH_FACTORS {
@@ -160,7 +159,7 @@ impl<'a, const D: usize> Prepared<'a, D> {
         best.map(|(_, settings)| settings)
     }
 
-    /// The prediction of a process for every judged row without the row's block.
+    /// Returns the prediction of a process for every judged row, without the row's block.
     pub(super) fn left_out(&self, kind: ProcessKind, chosen: &Chosen) -> Option<Vec<Gaussian<f64>>> {
         let (Settings { lengths, noise, .. }, of) = (&chosen.settings, (kind, chosen.inputs.as_slice()));
         let LeftOut { rows, noise } = match self.sums(of, lengths) {
@@ -184,7 +183,7 @@ impl<'a, const D: usize> Prepared<'a, D> {
         Some(rows.into_iter().enumerate().map(predicted).collect())
     }
 
-    /// Returns the errors of the predictions of judged rows, in units of their deviations, block by block.
+    /// Returns the errors of the predictions of judged rows, in units of their standard deviations, block by block.
     fn deviations(&self, predicted: &[Gaussian<f64>]) -> Vec<Vec<f64>> {
         let of_row = |k: usize| {
             (predicted[k].mean - self.judged.strain[k]).hypot(self.examples.reference_sd) / predicted[k].sd()
@@ -192,7 +191,8 @@ impl<'a, const D: usize> Prepared<'a, D> {
         self.judged.blocks.iter().map(|block| block.clone().map(of_row).collect()).collect()
     }
 
-    /// Returns the factor on the deviation of the predictions of judged rows that makes intervals right, beside the member mixed in last.
+    /// Returns the factor on the standard deviation of the predictions of judged rows at which intervals have their nominal coverage, mixed
+    /// with `last`.
     pub(super) fn scale_beside(&self, predicted: &[Gaussian<f64>], last: &[Gaussian<f64>]) -> f64 {
         joint_scale_of(|scale| {
             let scaled =
@@ -203,7 +203,7 @@ impl<'a, const D: usize> Prepared<'a, D> {
         })
     }
 
-    /// Conditions a process on the examples, or on all rows that they stand for.
+    /// Conditions a process on the examples, or on all rows that they represent.
     pub(super) fn conditioned(
         &self,
         kind: ProcessKind,
@@ -221,7 +221,7 @@ impl<'a, const D: usize> Prepared<'a, D> {
     }
 }
 
-/// A process that has seen its rows.
+/// A process conditioned on its rows.
 pub(super) struct Conditioned {
     pub(super) weights: Vec<f64>,
     pub(super) variance: f64,
@@ -229,7 +229,7 @@ pub(super) struct Conditioned {
     known: Known,
 }
 
-/// The rows that it has seen.
+/// The rows on which it is conditioned.
 enum Known {
     Examples(GaussianProcess),
     All(Sums, f64),
@@ -251,17 +251,17 @@ impl Conditioned {
     }
 }
 
-/// The strain that a process adds its mean to.
+/// Returns the strain to which a process adds its mean.
 fn base<const D: usize>(kind: ProcessKind, inputs: &[f64; D]) -> f64 {
     if kind == ProcessKind::Residual { inputs[0] } else { 0.0 }
 }
 
-/// Targets of a process.
+/// Returns the targets of a process.
 fn targets<const D: usize>(kind: ProcessKind, inputs: &[[f64; D]], strain: &[f64]) -> Vec<f64> {
     strain.iter().zip(inputs).map(|(strain, inputs)| strain - base(kind, inputs)).collect()
 }
 
-/// Inputs that a process sees.
+/// Returns the inputs of a process.
 pub(super) fn seen<const D: usize>(places: &[usize], rows: &[[f64; D]]) -> Vec<Vec<f64>> {
     rows.iter().map(|row| places.iter().map(|&i| row[i]).collect()).collect()
 }
@@ -270,7 +270,8 @@ fn as_slices(rows: &[Vec<f64>]) -> Vec<&[f64]> {
     rows.iter().map(Vec::as_slice).collect()
 }
 
-/// Mean, deviation and range of values; a value that never changes tells nothing, however far from it another one is.
+/// Returns mean, standard deviation and range of values. A constant input gets an infinite standard deviation, so that it has no effect
+/// even at values far from it.
 pub(super) fn scale(values: impl Iterator<Item = f64> + Clone) -> InputScale<f64> {
     let n = values.clone().count() as f64;
     let mean = values.clone().sum::<f64>() / n;

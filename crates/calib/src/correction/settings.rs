@@ -7,23 +7,22 @@ use ohmstrain_sensor::correction::relevance;
 
 use super::gaussian_process::{GaussianProcess, Noise, Settings, TrainingSet, lower_triangle};
 
-/// Length scales, of all inputs alike, noises and correlation times tried: coarse, since a few hundred rows whose errors hang
-/// together tell no more.
+/// Length scales, common to all inputs, noises and correlation times tried. The grid is coarse: a few hundred rows with correlated errors
+/// determine no more.
 const LENGTHS: [f64; 3] = [2.0, 4.0, 8.0];
 const NOISES: [f64; 3] = [0.03, 0.1, 0.3];
 const NOISE_TIMES_S: [f64; 2] = [2.0, 10.0];
-/// Factor between length scales that are tried for one input. After the common length scale each input but the first, on which the
-/// linear part of the kernel depends, finds a length scale of its own, in steps of this factor, in turn, and once again.
+/// Factor between the length scales tried for one input, and number of passes over the inputs. After the common length scale, each input in
+/// turn gets its own, except the first, on which the linear part of the kernel depends.
 const STRETCH: f64 = 2.0;
 const TURNS: usize = 2;
-/// Prior of a length scale over that of all inputs: log-normal, with this factor for a standard deviation; and its limits.
+/// Prior of a length scale relative to the common one: log-normal, with this factor as a standard deviation; and its limits.
 const SPREAD: f64 = 2.0;
 const LEAST_STRETCH: f64 = 0.25;
 const MOST_STRETCH: f64 = 8.0;
 
 impl TrainingSet<'_> {
-    /// The settings that are best by a criterion times the prior of the length scales; none if no covariance is positive
-    /// definite.
+    /// Returns the settings that maximise the criterion times the prior of the length scales; `None` if no covariance is positive definite.
     pub(crate) fn best_settings(self, criterion: Criterion) -> Option<Settings> {
         self.alike(criterion).map(|(cost, params)| self.with_relevance(criterion, cost, params))
     }
@@ -49,15 +48,15 @@ impl TrainingSet<'_> {
         })
     }
 
-    /// Automatic relevance determination (Neal, *Bayesian Learning for Neural Networks*, 1996): inputs that tell little get long
-    /// length scales. Coordinates in turn, since a step of one is all that a few hundred rows can tell.
+    /// Determines the relevance of inputs automatically (Neal, *Bayesian Learning for Neural Networks*, 1996): inputs with little
+    /// information get long length scales. One coordinate moves at a time; a few hundred rows cannot resolve more.
     fn with_relevance(self, criterion: Criterion, cost: f64, params: Settings) -> Settings {
         let inputs = params.lengths.len();
         let noise = Noise::new(self, params.noise, params.noise_time_s);
         let sums = self.half_squares(&params.lengths);
         let mut search = RelevanceSearch { training: self, criterion, noise, sums, params, cost };
         for input in (1..inputs).cycle().take(TURNS * (inputs - 1)) {
-            // Shorter for as long as it pays; if it does not at all, longer.
+            // Shortens for as long as that helps; if it does not help at all, lengthens.
             let shorter = (0..).take_while(|_| search.step(input, 1.0 / STRETCH)).count();
             while shorter == 0 && search.step(input, STRETCH) {}
         }
@@ -76,7 +75,7 @@ impl TrainingSet<'_> {
     }
 }
 
-/// Settings on the way to better ones.
+/// State of the search for better settings.
 struct RelevanceSearch<'a> {
     training: TrainingSet<'a>,
     criterion: Criterion,
@@ -89,7 +88,7 @@ struct RelevanceSearch<'a> {
 }
 
 impl RelevanceSearch<'_> {
-    /// Multiplies the length scale of an input, if that is better.
+    /// Multiplies the length scale of an input, if that lowers the cost.
     fn step(&mut self, input: usize, factor: f64) -> bool {
         let (now, alike) = (self.params.lengths[input], self.params.lengths[0]);
         let trial = factor * now;

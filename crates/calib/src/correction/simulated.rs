@@ -1,5 +1,4 @@
-//! Strain from features of readings that the law gives in simulated motions, which the sensor was not seen in: by a few rows that
-//! stand for thousands.
+//! Strain from features of the law's readings in simulated motions, beyond those of the calibration; a few rows represent thousands.
 
 use std::ops::Range;
 
@@ -14,13 +13,13 @@ use super::prepared::{Prepared, scale};
 use super::weight;
 use crate::digits::digits;
 
-/// Rows that stand for all others. Two hundred carry no more information.
+/// Number of rows that represent all others. Two hundred carry no more information.
 const ROWS: usize = 64;
 /// Length scale of all inputs, in their standard deviations.
 const LENGTH: f64 = 4.0;
-/// Keeps the equations regular, in variances of the process.
+/// Regularisation of the equations, in units of the process' variance.
 const JITTER: f64 = 1e-4;
-/// The noise is found in turn with the weights, so many times, from this share of the strain's variance.
+/// Number of iterations that alternate between weights and noise, and initial noise as a fraction of the strain's variance.
 const TURNS: usize = 4;
 const FIRST_NOISE: f64 = 0.1;
 
@@ -34,18 +33,18 @@ pub(crate) struct SimulatedRow {
     pub strain: f64,
 }
 
-/// A few rows that stand for all.
+/// A few rows that represent all.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Distilled {
-    /// Standard deviation of the strain that they leave.
+    /// Standard deviation of the strain around their prediction.
     pub sd: f64,
     /// The rows.
     pub rows: Vec<SimulatedRow>,
 }
 
 impl Distilled {
-    /// Learns from simulated rows; `real` are those whose inputs' scales count. None if equations are singular.
+    /// Learns from simulated rows; `real` rows determine the scales of the inputs. `None` if equations are singular.
     pub(crate) fn fit(simulated: &[SimulatedRow], real: &[TrainingRow], limits: RangeParams) -> Option<Self> {
         let scales: [_; FEATURES] = std::array::from_fn(|i| scale(real.iter().map(|row| row.past[i])));
         let on_scale = |row: &SimulatedRow| -> [f64; FEATURES] {
@@ -67,14 +66,14 @@ fn centre(limits: RangeParams) -> f64 {
     0.5 * (limits.lower + limits.upper)
 }
 
-/// Places of the rows that stand for so many.
+/// Returns the indices of the representing rows among `rows`.
 fn chosen(rows: usize) -> impl Iterator<Item = usize> {
     let count = ROWS.min(rows);
     (0..count).map(move |k| k * rows / count)
 }
 
-/// Values of the process at the rows that stand for all, by a subset of regressors (Quiñonero-Candela & Rasmussen, *J. Mach. Learn.
-/// Res.* 6 (2005) 1939), and the standard deviation of what that leaves.
+/// Returns the values of the process at the representing rows, by a subset of regressors (Quiñonero-Candela & Rasmussen, *J. Mach. Learn.
+/// Res.* 6 (2005) 1939), and the standard deviation of the residual.
 fn distilled(inputs: &[&[f64]], strain: &[f64], centre: f64) -> Option<(Vec<f64>, f64)> {
     let chosen: Vec<&[f64]> = chosen(inputs.len()).map(|k| inputs[k]).collect();
     let (with_all, among) = (kernels(inputs, &chosen), kernels(&chosen, &chosen));
@@ -103,8 +102,8 @@ fn kernels(a: &[&[f64]], b: &[&[f64]]) -> DMatrix<f64> {
 }
 
 impl Prepared<'_, FILTER_INPUTS> {
-    /// Learns the process of simulated rows. Its error is that in simulation, if the law is right, and, since it is not, that
-    /// in the worst block of the rows that it is judged on.
+    /// Learns the process of simulated rows. Its variance is the sum of two: that of its error in simulation, where the law is exact, and
+    /// the mean squared error in the worst block of the judged rows, where it is not.
     pub(crate) fn simulated(&self, of: &Distilled) -> Option<SimulatedParams> {
         let rows: Vec<[f64; FEATURES]> = of.rows.iter().map(|row| row.past).collect();
         let standardised = self.simulated_rows(&rows);
@@ -122,7 +121,7 @@ impl Prepared<'_, FILTER_INPUTS> {
         Some(SimulatedParams { mean, sd: (of.sd.powi(2) + worst).sqrt(), length: LENGTH, weights, rows })
     }
 
-    /// Prediction of each judged row from the simulated ones.
+    /// Predicts each judged row from the simulated ones.
     pub(super) fn simulated_predictions(&self, of: &SimulatedParams) -> Vec<Gaussian<f64>> {
         let variance = of.sd.powi(2);
         self.predictions(&of.rows, &of.weights).map(|mean| Gaussian { mean, variance }).collect()
@@ -152,7 +151,7 @@ mod tests {
     use ohmstrain_ekf::correction::InputScale;
     use ohmstrain_sensor::FUTURE_FEATURES;
 
-    /// Strain is a smooth function of two features; the others are noise.
+    /// Returns rows whose strain is a smooth function of two features; the others are noise.
     fn rows(count: usize, seed: usize) -> (Vec<[f64; D]>, Vec<f64>) {
         let number = |k: usize| 2.0 * ((k as f64 * 12.9898).sin() * 43758.5453).rem_euclid(1.0) - 1.0;
         let inputs: Vec<[f64; D]> =
@@ -163,8 +162,8 @@ mod tests {
     const D: usize = FILTER_INPUTS;
     const LIMITS: RangeParams = RangeParams { lower: -2.0, upper: 2.0 };
 
-    /// Tests that sixty-four rows stand for four thousand, with the stated error: two features of seven within ±1.7, in a kernel four
-    /// wide. An error in one block of the calibration's rows widens the stated error for all.
+    /// Tests that sixty-four rows represent four thousand, with the stated error: two features of seven within ±1.7, in a kernel four wide.
+    /// An error in one block of the calibration's rows widens the stated error for all.
     #[test]
     fn few_rows_stand_for_all_and_state_their_error() {
         let (real, known) = rows(100, 7);
@@ -199,7 +198,7 @@ mod tests {
             (of, distilled.sd, prepared.scales)
         };
         let (of, sd, scales): (_, _, [InputScale<f64>; D]) = said_of(&known);
-        // Of a strain whose deviation is 0.5: sixty-four rows in seven dimensions, most of which tell nothing.
+        // The strain has a standard deviation of 0.5; sixty-four rows cover seven dimensions, most of them irrelevant.
         assert!(sd < 0.05, "{sd}");
         let (others, strain) = rows(500, 900_000);
         let on_scale = |row: &[f64; D], i: usize| (row[i] - scales[i].mean) / scales[i].sd;
@@ -216,7 +215,7 @@ mod tests {
         assert!(left < 1.5 * of.sd && of.sd < 0.1, "{left} {}", of.sd);
         let off: Vec<f64> = known.iter().enumerate().map(|(k, x)| if k < 20 { x + 0.5 } else { *x }).collect();
         let (of, sd, _) = said_of(&off);
-        // Errors of 0.015 in twenty rows: 0.003 is one deviation of the cross term.
+        // Errors of 0.015 in twenty rows: 0.003 is one standard deviation of the cross term.
         assert!((of.sd * of.sd - sd * sd - 0.25).abs() < 0.01, "{}", of.sd);
     }
 }

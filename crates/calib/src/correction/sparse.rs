@@ -1,9 +1,9 @@
 //! Weights of a few rows from all rows of several recordings.
 //!
 //! The process is `Σ αⱼ k(x, uⱼ)` over the few rows u, a priori with the covariance `K⁻¹` (deterministic training conditional:
-//! Quiñonero-Candela & Rasmussen, *J. Mach. Learn. Res.* 6 (2005) 1939). Each recording has an offset of its own besides, since its R₀
-//! and the state that it began in are its own. Settings and factors are judged by recordings left out: within one recording
-//! neighbours share what another day does not have.
+//! Quiñonero-Candela & Rasmussen, *J. Mach. Learn. Res.* 6 (2005) 1939). Each recording also has its own offset, because R₀ and the initial
+//! state differ between recordings. Settings and factors are judged on held-out recordings: neighbours within one recording share errors
+//! that do not occur on another day.
 
 use crate::dense::product;
 use std::ops::Range;
@@ -14,12 +14,12 @@ use ohmstrain_sensor::correction::relevance;
 
 use super::gaussian_process::{LeftOutRow, WHITE};
 
-/// Standard deviation of a recording's offset, in those of the targets.
+/// Standard deviation of a recording's offset, in standard deviations of the targets.
 const OFFSET: f64 = 0.25;
-/// Correlation time of errors, s: rows that are closer count for less. Whitening them as an Ornstein-Uhlenbeck process makes other
-/// recordings worse (docs/notes/2026-11-26-correction-several-recordings.md).
+/// Correlation time of errors, s; rows that are closer count for less. Whitening the errors as an Ornstein-Uhlenbeck process gives worse
+/// predictions of other recordings (docs/notes/2026-11-26-correction-several-recordings.md).
 const ERROR_TIME_S: f64 = 4.0;
-/// Keeps the kernels of the few rows apart, and the equations regular.
+/// Regularisation that keeps the kernels of the few rows apart.
 const JITTER: f64 = 1e-6;
 const LEAST: f64 = 1e-9;
 
@@ -34,17 +34,17 @@ pub(super) struct Population<'a> {
     pub step_s: f64,
 }
 
-/// Sums over a population, for given length scales: what any noise is fitted with.
+/// Sums over a population for given length scales, from which a fit with any noise follows.
 pub(super) struct Sums {
     /// Mean and standard deviation of the targets.
     pub centre: f64,
     pub size: f64,
     targets: DVector<f64>,
-    /// Kernels of all rows with the few.
+    /// Kernels between all rows and the few.
     kernels: DMatrix<f64>,
-    /// Kernels of all rows with themselves.
+    /// Kernel of each row with itself.
     priors: Vec<f64>,
-    /// Kernels of the few rows with each other.
+    /// Kernels between the few rows.
     few: DMatrix<f64>,
     /// The inverse of the prior covariance of weights and offsets.
     regular: DMatrix<f64>,
@@ -52,11 +52,11 @@ pub(super) struct Sums {
     own: Vec<Normal>,
     all: Normal,
     recordings: Vec<Range<usize>>,
-    /// Share of a row's information that its neighbours do not have.
+    /// Fraction of a row's information that its neighbours do not share.
     share: f64,
 }
 
-/// Normal equations of weights, then offsets: matrix, right-hand side, and square of the targets.
+/// Normal equations of weights, then offsets: matrix, right-hand side, and sum of squared targets.
 #[derive(Clone)]
 struct Normal {
     matrix: DMatrix<f64>,
@@ -109,12 +109,12 @@ impl Sums {
         }
     }
 
-    /// Variance of the noise, of every row by itself, in variances of the prior.
+    /// Returns the variance of the noise of a single row, in units of the prior variance.
     fn white(noise: f64) -> f64 {
         (1.0 + WHITE) * noise * noise
     }
 
-    /// Factors the normal equations with the prior; without one recording, if given.
+    /// Factors the normal equations with the prior, without one recording if given.
     fn factor(&self, noise: f64, without: Option<&Normal>) -> Option<Cholesky<f64, Dyn>> {
         let mut matrix = &self.regular * Self::white(noise) + &self.all.matrix;
         if let Some(own) = without {
@@ -126,7 +126,7 @@ impl Sums {
         matrix.cholesky()
     }
 
-    /// Weights of the few rows, in the unit of the targets, and the prior variance where the kernel is 1, in its square.
+    /// Returns the weights of the few rows, in the unit of the targets, and the prior variance where the kernel is 1, in that unit squared.
     pub(super) fn weights(&self, noise: f64) -> Option<(Vec<f64>, f64)> {
         let solution = self.factor(noise, None)?.solve(&self.all.right);
         let rows = self.targets.len() as f64 * self.share;
@@ -135,12 +135,12 @@ impl Sums {
         Some((weights, scale.max(0.0) * self.size * self.size))
     }
 
-    /// Variance of what is not predicted, noise and a recording's offset, in variances of the prior.
+    /// Returns the unpredictable variance, of the noise and a recording's offset, in units of the prior variance.
     pub(super) fn unpredicted(noise: f64) -> f64 {
         Self::white(noise) + OFFSET * OFFSET
     }
 
-    /// Predicts every row without its recording; the prior of a variance of 1.
+    /// Predicts every row without its recording, for a prior variance of 1.
     pub(super) fn left_out(&self, noise: f64) -> Option<Vec<LeftOutRow>> {
         let m = self.few.nrows();
         let among = self.few.clone().cholesky()?.inverse();
@@ -161,8 +161,8 @@ impl Sums {
         Some(predicted)
     }
 
-    /// The negative logarithm of the density of a row without its recording, with the prior variance that makes it least, up to a
-    /// constant.
+    /// Returns the mean negative log density of the rows, each predicted without its recording, at the prior variance that minimises it, up
+    /// to a constant.
     pub(super) fn cost(&self, noise: f64) -> Option<f64> {
         let rows = self.left_out(noise)?;
         let count = rows.len() as f64;
@@ -175,8 +175,8 @@ impl Sums {
         Some(0.5 * ((squares / count).ln() + logarithms / count))
     }
 
-    /// Rows of the upper triangle W, one after the other: |W k|² is the share of the prior variance that all rows explain through
-    /// these of the few, whose kernels are k.
+    /// Returns the rows of the upper triangle W, one after the other: |W k|² is the fraction of the prior variance that all rows explain
+    /// through these of the few, whose kernels are k.
     pub(super) fn explained(&self, noise: f64, inducing: &[usize]) -> Option<Vec<f64>> {
         let m = inducing.len();
         let among = self.few.select_rows(inducing).select_columns(inducing).cholesky()?.inverse();
@@ -194,7 +194,7 @@ impl Sums {
 }
 
 impl Normal {
-    /// Computes the sums over the rows of a recording, whose offset has a place among the unknowns.
+    /// Computes the sums over the rows of a recording, whose offset is one of the unknowns.
     fn of_recording(
         (kernels, targets): (&DMatrix<f64>, &DVector<f64>),
         rows: &Range<usize>,

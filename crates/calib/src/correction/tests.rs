@@ -11,7 +11,7 @@ use ohmstrain_sensor::correction::{OwnedCorrection, ProcessKind};
 const D: usize = 8;
 const LIMITS: RangeParams = RangeParams { lower: -10.0, upper: 10.0 };
 
-/// Rows that no two inputs of agree, on curves that wander; a filter that is wrong by something smooth.
+/// Returns rows on wandering curves, no two of which agree in their inputs, with a filter whose error is smooth.
 fn examples<const D: usize>(n: usize, dt_s: f64) -> (Vec<[f64; D]>, Vec<f64>, Vec<f64>) {
     let time_s: Vec<f64> = (0..n).map(|k| dt_s * k as f64).collect();
     let strain: Vec<f64> = time_s.iter().map(|t| (0.21 * t).sin()).collect();
@@ -23,8 +23,8 @@ fn examples<const D: usize>(n: usize, dt_s: f64) -> (Vec<[f64; D]>, Vec<f64>, Ve
     (inputs, strain, time_s)
 }
 
-/// The textbook: mean and variance of the latent function and the noise's variance, with targets in their own unit
-/// (Rasmussen & Williams 2006, eqs 2.23 and 2.24), for the kernel and noise written out here.
+/// Textbook equations: mean and variance of the latent function and the noise's variance, with targets in their own unit (Rasmussen &
+/// Williams 2006, eqs 2.23 and 2.24), for the kernel and noise written out here.
 struct Textbook {
     mean: f64,
     latent: f64,
@@ -60,7 +60,7 @@ fn textbook(rows: &[Vec<f64>], targets: &[f64], time_s: &[f64], settings: &Setti
     let mean = targets.iter().sum::<f64>() / n as f64;
     let y = DVector::from_iterator(n, targets.iter().map(|y| y - mean));
     let k = DVector::from_iterator(n, x.iter().map(|row| kernel(row, &at)));
-    // The kernel's scale in the unit of the targets that makes the marginal likelihood largest.
+    // Scale of the kernel, in the unit of the targets, that maximises the marginal likelihood.
     let scale = y.dot(&(&inverse * &y)) / n as f64;
     let prior = kernel(&at, &at);
     Textbook {
@@ -71,20 +71,20 @@ fn textbook(rows: &[Vec<f64>], targets: &[f64], time_s: &[f64], settings: &Setti
     }
 }
 
-/// The correction that processes learn from examples, as it runs.
+/// Returns the running correction that processes learn from examples.
 fn learned<const D: usize, const S: usize>(choices: &Choices, examples: Examples<D>) -> OwnedCorrection<f64, D, S> {
     let params = choices.learned::<D, S>(&Prepared::new(examples)).unwrap();
     OwnedCorrection::new(&params, examples.inputs, examples.limits)
 }
 
-/// Around one length, no two alike.
+/// Returns length scales around one value, no two alike.
 fn lengths(around: f64, inputs: usize) -> Vec<f64> {
     (0..inputs).map(|i| around * (1.0 + 0.3 * (i as f64).sin())).collect()
 }
 
 #[test]
 fn a_correction_says_what_the_textbook_says() {
-    // As many rows as may be inducing: nothing is left out of the variance.
+    // As many rows as may be inducing, so the variance is exact.
     let (inputs, strain, time_s) = examples(40, 1.7);
     let examples =
         Examples { inputs: &inputs, strain: &strain, time_s: &time_s, limits: LIMITS, reference_sd: 0.0, all: None };
@@ -101,7 +101,7 @@ fn a_correction_says_what_the_textbook_says() {
     let features: Vec<Vec<f64>> = inputs.iter().map(|row| row[6..].to_vec()).collect();
     let residuals: Vec<f64> = inputs.iter().zip(&strain).map(|(row, strain)| strain - row[0]).collect();
     for k in 0..39 {
-        // Between two rows, within the range of all.
+        // A point between two rows, within the range of all.
         let input: [f64; D] = std::array::from_fn(|i| 0.5 * (inputs[k][i] + inputs[k + 1][i]));
         let predicted = correction.correction().correct(&input, Gaussian { mean: input[0], variance: 0.0 }, 1.0);
         let least = |book: &Textbook, share: f64| {
@@ -109,7 +109,7 @@ fn a_correction_says_what_the_textbook_says() {
                 strain.iter().map(|x| x * x).sum::<f64>() / 40.0 - (strain.iter().sum::<f64>() / 40.0).powi(2);
             book.latent * (share * variance / book.prior).max(1.0)
         };
-        // Matrices of condition 1e6, and what keeps the 40 kernels apart: 1e-8.
+        // Condition numbers of 1e6, and the regularisation of the 40 kernels: 1e-8.
         let close = |a: f64, b: f64| (a - b).abs() < 1e-6;
         let book = textbook(&features, &strain, &time_s, &direct, &input[6..]);
         assert!(close(predicted.direct.mean, book.mean), "{k}: {} {}", predicted.direct.mean, book.mean);
@@ -121,7 +121,7 @@ fn a_correction_says_what_the_textbook_says() {
     }
 }
 
-/// Compares a process of one side of time with the textbook's, on rows that have nothing but that side.
+/// Compares a one-sided process with the textbook's, on rows that have only that side.
 #[test]
 fn one_sided_processes_see_their_side_alone() {
     const BOTH: usize = 17;
@@ -159,7 +159,7 @@ fn one_sided_processes_see_their_side_alone() {
     }
 }
 
-/// Tests inducing rows: with fewer of them the variance is larger, never smaller, and the mean stays as with all.
+/// Tests inducing rows: with fewer of them the variance is larger, never smaller, and the mean is that with all.
 #[test]
 fn inducing_rows_cost_no_certainty_that_is_not_there() {
     let (inputs, strain, time_s) = examples(200, 1.7);
@@ -185,8 +185,8 @@ fn inducing_rows_cost_no_certainty_that_is_not_there() {
     }
 }
 
-/// Tests length scales: of eight inputs of independent rows the target depends on the first and the third. The third gets
-/// the shortest length scale, and held-out rows are explained better than with any one length scale of all.
+/// Tests length scales: the rows are independent, and the target depends on the first and the third of eight inputs. The third gets the
+/// shortest length scale, and held-out rows are predicted better than with any common length scale.
 #[test]
 fn inputs_that_tell_nothing_get_long_length_scales() {
     const SETTINGS: Settings = Settings { lengths: Vec::new(), noise: 0.03, noise_time_s: 2.0 };
@@ -214,7 +214,7 @@ fn inputs_that_tell_nothing_get_long_length_scales() {
     }
 }
 
-/// Compares the closed form of a process without a block to a process that never had the block, centre and scale aside.
+/// Compares the closed form of a process without a block to a process that was never given the block, apart from centre and scale.
 #[test]
 fn blocks_left_out_are_predicted_from_the_others() {
     let (inputs, strain, time_s) = examples::<D>(50, 1.7);
@@ -237,7 +237,7 @@ fn blocks_left_out_are_predicted_from_the_others() {
         let inverse = DMatrix::from_fn(40, 40, |i, j| covariance(others[i], others[j])).try_inverse().unwrap();
         let y = DVector::from_iterator(40, others.iter().map(|&k| strain[k] - mean));
         for k in 10 * block..10 * block + 10 {
-            // Its noise is correlated with that of the neighbours, which is known.
+            // The row's noise is correlated with that of its neighbours, which is known.
             let known = DVector::from_iterator(40, others.iter().map(|&j| covariance(k, j)));
             let predicted = mean + known.dot(&(&inverse * &y));
             assert!((left_out[k].mean - predicted).abs() < 1e-6, "{k}");
@@ -248,7 +248,7 @@ fn blocks_left_out_are_predicted_from_the_others() {
     }
 }
 
-/// The least of a function of one number with one minimum, between 1e-6 and 1e6 on a logarithmic scale.
+/// Minimises a function of one number with one minimum, between 1e-6 and 1e6 on a logarithmic scale.
 fn least(of: impl Fn(f64) -> f64) -> f64 {
     let (mut low, mut high) = (-6.0 * 10f64.ln(), 6.0 * 10f64.ln());
     while high - low > 1e-9 {
@@ -258,15 +258,15 @@ fn least(of: impl Fn(f64) -> f64) -> f64 {
     of(low.exp())
 }
 
-/// The negative logarithm of a normal density.
+/// Returns the negative logarithm of a normal density.
 fn surprise(error: &DVector<f64>, covariance: &DMatrix<f64>) -> f64 {
     let inverse = covariance.clone().try_inverse().unwrap();
     let logs = covariance.determinant().ln() + error.len() as f64 * std::f64::consts::TAU.ln();
     0.5 * (error.dot(&(inverse * error)) + logs)
 }
 
-/// Costs of two settings differ by the negative logarithms of densities, summed over held-out blocks. A process that never had these
-/// blocks predicts them, each with the prior variance that minimises the sum.
+/// Costs of two settings differ by the negative log densities summed over held-out blocks. They are predicted by a process that was never
+/// given these blocks, with the prior variance that minimises the sum.
 #[test]
 fn settings_are_judged_by_evidence_and_by_what_was_left_out() {
     const ROWS: usize = 23;
@@ -286,7 +286,7 @@ fn settings_are_judged_by_evidence_and_by_what_was_left_out() {
                 + settings.noise.powi(2) * correlated
                 + white
         });
-        // Of 23 rows five blocks begin at 0, 4, 9, 13 and 18.
+        // Five blocks of 23 rows begin at 0, 4, 9, 13 and 18.
         let predicted = [0..4, 4..9, 9..13, 13..18, 18..23].map(|block| {
             let (own, others): (Vec<usize>, Vec<usize>) = (0..ROWS).partition(|k| block.contains(k));
             let between = |a: &[usize], b: &[usize]| covariance.select_rows(a).select_columns(b);
@@ -316,7 +316,7 @@ fn settings_are_judged_by_evidence_and_by_what_was_left_out() {
     for (place, criterion) in [Criterion::LeftOutAndEvidence, Criterion::LeftOut].into_iter().enumerate() {
         let cost = |of: &Settings| criterion.cost(&GaussianProcess::new(training, of).unwrap()).unwrap();
         let differ = cost(&settings[0]) - cost(&settings[1]);
-        // Matrices of condition 1e5, and a minimum that is found where a function is flat to the last digit.
+        // Condition numbers of 1e5, and a minimum found where the function is flat to the last digit.
         assert!(
             (differ - (expected[0][place] - expected[1][place])).abs() < 1e-7,
             "{criterion:?}: {differ} {expected:?}"
@@ -343,7 +343,7 @@ fn a_factor_covers_the_worst_block_or_all_together() {
         let by = Choosing { criterion: Criterion::LeftOut, covers_worst };
         let params = prepared.chosen(ProcessKind::Residual, by).unwrap();
         let predicted = prepared.left_out(ProcessKind::Residual, &params).unwrap();
-        // Neither of the factor's limits.
+        // The factor is at neither of its limits.
         assert!(params.sd_scale > 1.01 && params.sd_scale < 2.99, "{}", params.sd_scale);
         let is_covered = |k: &usize| (predicted[*k].mean - strain[*k]).abs() <= 1.959964 * predicted[*k].sd();
         [0, 1, 2, 3, 4].map(|block| (32 * block..32 * (block + 1)).filter(is_covered).count())
@@ -354,8 +354,8 @@ fn a_factor_covers_the_worst_block_or_all_together() {
     assert_eq!(together.into_iter().sum::<usize>(), 153, "{together:?}");
 }
 
-/// Tests learning: the correction is better than the filter on rows between the training rows; far from them the estimate stays
-/// the filter's, with a wide interval.
+/// Tests learning: the correction is better than the filter on rows between the training rows; far from them the estimate remains the
+/// filter's, with a wide interval.
 #[test]
 fn learning_helps_near_and_leaves_far_alone() {
     let (inputs, strain, time_s) = examples(160, 0.5);
@@ -375,18 +375,18 @@ fn learning_helps_near_and_leaves_far_alone() {
         after += (predicted.mean - strain[k]).powi(2);
         covered += u32::from((predicted.mean - strain[k]).abs() <= 1.96 * predicted.sd());
     }
-    // The error of the filter is a function of the inputs; noise there is none.
+    // The error of the filter is a function of the inputs, without noise.
     assert!(after < 0.04 * before, "{after} {before}");
     assert!(covered >= 72, "{covered} of 80");
     let mut far = inputs[80].map(|x| x + 100.0);
     far[0] = 0.3;
     let predicted = correction.correction().correct(&far, Gaussian { mean: 0.3, variance: 0.01 }, 1.0);
     assert!(predicted.novelty > 0.99);
-    // The strain has a deviation of 0.7; six per cent of its variance are allowed for at the least.
+    // The strain has a standard deviation of 0.7; at least six per cent of its variance is allowed for.
     assert!(predicted.strain.sd() > 0.17, "{}", predicted.strain.sd());
 }
 
-/// Three recordings of the same function, each with an offset of its own; `few` of their rows stand for all.
+/// Returns three recordings of the same function, each with its own offset; `few` of their rows represent all.
 fn recordings(few: usize) -> (Vec<[f64; D]>, Vec<f64>, Vec<[f64; D]>) {
     let number = |seed: usize| 2.0 * ((seed as f64 * 12.9898).sin() * 43758.5453).rem_euclid(1.0) - 1.0;
     let inputs: Vec<[f64; D]> = (0..90).map(|k| std::array::from_fn(|i| 1.7 * number(31 * k + i))).collect();
@@ -396,9 +396,9 @@ fn recordings(few: usize) -> (Vec<[f64; D]>, Vec<f64>, Vec<[f64; D]>) {
     (inputs, strain, chosen)
 }
 
-/// A row of normal equations written out: Bayesian regression on kernels of the few rows and an indicator of each recording, weights
-/// a priori as the inverse kernels, offsets with a deviation of a quarter of the targets'. Rows half a second apart whose errors last for
-/// four seconds count for a sixteenth each.
+/// Compares with normal equations written out: Bayesian regression on kernels of the few rows and an indicator of each recording. The prior
+/// covariance of the weights is the inverse of the kernels; offsets have a standard deviation of a quarter of the targets'. Rows half a
+/// second apart with a correlation time of four seconds count for a sixteenth each.
 #[test]
 fn a_few_rows_learn_what_all_recordings_say() {
     let (inputs, strain, few) = recordings(12);
@@ -424,7 +424,7 @@ fn a_few_rows_learn_what_all_recordings_say() {
             }
         }
     });
-    // Rows of some recordings; posterior mean and covariance of weights and offsets, the noise's variance being 1.
+    // Rows of some recordings: posterior mean and covariance of weights and offsets, for a noise variance of 1.
     let posterior = |of: &[usize]| {
         let rows: Vec<usize> = of.iter().flat_map(|g| recordings[*g].clone()).collect();
         let design = DMatrix::from_fn(rows.len(), 15, |k, j| {
@@ -452,7 +452,7 @@ fn a_few_rows_learn_what_all_recordings_say() {
         let kernels = DVector::from_fn(12, |j, _| kernel(z(row), z(&few[j])));
         let found: f64 = kernels.iter().zip(&direct.weights).map(|(kernel, weight)| kernel * weight).sum();
         let expected = size * kernels.dot(&weights.rows(0, 12));
-        // Of weights of kernels that are nearly alike only the sum is known; the equations are kept regular by 1e-9.
+        // Kernels that are nearly alike determine only the sum of their weights; the equations are regularised by 1e-9.
         assert!((found - expected).abs() < 1e-5, "{found} {expected}");
     }
     let predicted = prepared.left_out(ProcessKind::Direct, &chosen).unwrap();
@@ -462,7 +462,7 @@ fn a_few_rows_learn_what_all_recordings_say() {
             let of_row = DVector::from_fn(15, |j, _| if j < 12 { kernel(z(&inputs[k]), z(&few[j])) } else { 0.0 });
             let expected = mean + size * of_row.dot(&weights);
             assert!((predicted[k].mean - expected).abs() < 1e-5, "{k}: {} {expected}", predicted[k].mean);
-            // A row far from the few is not known because these are: what no kernel explains is added.
+            // A row far from the few stays unknown: the variance that no kernel explains is added.
             let kernels = of_row.rows(0, 12).into_owned();
             let among = regular.view((0, 0), (12, 12)).into_owned().try_inverse().unwrap();
             let prior = kernel(z(&inputs[k]), z(&inputs[k]));

@@ -6,17 +6,17 @@ use nalgebra::{Cholesky, DMatrix, Dyn, Matrix, Storage};
 use super::gram::dot;
 use super::tile::{COLUMNS, ROWS, Tile, tile};
 
-/// Factors `A = L Lᵀ` (n × n, its lower triangle is read); `None` if it is not positive definite. Digit for digit the factor of
-/// nalgebra: each entry takes off its products in order, then is divided. The upper triangle keeps the entries of `A`.
+/// Factors `A = L Lᵀ` (n × n, from its lower triangle); `None` if it is not positive definite. Digit for digit the factor of nalgebra: each
+/// entry has its products subtracted in order, then is divided. The upper triangle keeps the entries of `A`.
 pub(crate) fn cholesky(matrix: DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
     cholesky_at(Level::new(), matrix)
 }
 
-/// The factor with the instructions of this level.
+/// Factors with the instructions of this level.
 fn cholesky_at(level: Level, mut matrix: DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
     assert!(matrix.is_square(), "only a square matrix has a factor");
     let n = matrix.nrows();
-    // Columns of L that are done, in strips of rows; zeros beyond the last row.
+    // Finished columns of L, in strips of rows, with zeros beyond the last row.
     let mut strips: Vec<Vec<[f64; ROWS]>> = vec![Vec::with_capacity(n); n.div_ceil(ROWS)];
     for start in (0..n).step_by(COLUMNS) {
         let diagonal = start / ROWS;
@@ -40,12 +40,12 @@ fn cholesky_at(level: Level, mut matrix: DMatrix<f64>) -> Option<Cholesky<f64, D
     Some(Cholesky::pack_dirty(matrix))
 }
 
-/// Rows of a column of L that become a row of the right factor, negated: products are taken off.
+/// Returns rows of a column of L as a negated row of the right factor, so that products are subtracted.
 fn negated(rows: &[f64; ROWS], first: usize) -> [f64; COLUMNS] {
     std::array::from_fn(|c| -rows[first + c])
 }
 
-/// The tile of a matrix whose first entry is this one; zeros beyond its end.
+/// Returns the tile of a matrix whose first entry is this one, with zeros beyond the matrix.
 fn tile_of(matrix: &DMatrix<f64>, row: usize, column: usize) -> Tile {
     let (rows, columns) = (ROWS.min(matrix.nrows() - row), COLUMNS.min(matrix.ncols() - column));
     let mut tile = [[0.0; ROWS]; COLUMNS];
@@ -55,7 +55,7 @@ fn tile_of(matrix: &DMatrix<f64>, row: usize, column: usize) -> Tile {
     tile
 }
 
-/// Factors `columns` columns that have been relieved of all earlier ones. Their diagonal is in the first tile, from row `first` on.
+/// Factors `columns` columns from which all earlier ones are already subtracted. Their diagonal is in the first tile, from row `first` on.
 fn finish(tiles: &mut [Tile], first: usize, columns: usize) -> Option<()> {
     for c in 0..columns {
         for earlier in 0..c {
@@ -73,7 +73,7 @@ fn finish(tiles: &mut [Tile], first: usize, columns: usize) -> Option<()> {
     Some(())
 }
 
-/// The inverse of a lower triangle (n × n); what is above the diagonal is not read.
+/// Returns the inverse of a lower triangle (n × n); entries above the diagonal are not read.
 pub(crate) fn lower_inverse<S: Storage<f64, Dyn, Dyn>>(triangle: &Matrix<f64, Dyn, Dyn, S>) -> DMatrix<f64> {
     let n = triangle.nrows();
     let triangle = triangle.clone_owned();
@@ -86,7 +86,7 @@ pub(crate) fn lower_inverse<S: Storage<f64, Dyn, Dyn>>(triangle: &Matrix<f64, Dy
     inverse
 }
 
-/// The diagonal of the inverse of the matrix that was factored.
+/// Returns the diagonal of the inverse of the factored matrix.
 pub(crate) fn inverse_diagonal(factor: &Cholesky<f64, Dyn>) -> Vec<f64> {
     let triangle = factor.l_dirty();
     let entry = |j: usize| {
@@ -118,7 +118,7 @@ fn solve_upper(triangle: &DMatrix<f64>, first: usize, b: &mut [f64]) {
     }
 }
 
-/// A column of a lower triangle, from the diagonal on.
+/// Returns a column of a lower triangle, from the diagonal on.
 fn part_of(triangle: &DMatrix<f64>, column: usize) -> &[f64] {
     &triangle.as_slice()[column * triangle.nrows()..][column..triangle.nrows()]
 }
@@ -129,7 +129,7 @@ mod tests {
     use fearless_simd::Level;
     use nalgebra::DMatrix;
 
-    /// Positive definite matrices that fill tiles and do not.
+    /// Returns positive definite matrices, some of which fill their tiles.
     fn matrices() -> impl Iterator<Item = DMatrix<f64>> {
         [1, 3, 4, 8, 11, 16, 29, 40].into_iter().map(|n| {
             let apart = |i: usize, j: usize| (i as f64 - j as f64).abs() / 7.0;
@@ -137,7 +137,7 @@ mod tests {
         })
     }
 
-    /// The factor, its upper part included, at the least level of the processor as at the best one.
+    /// Compares the factor, its upper part included, with nalgebra's, at the lowest and the best level of the processor.
     #[test]
     fn the_factor_is_nalgebras() {
         for matrix in matrices() {

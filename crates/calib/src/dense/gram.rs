@@ -5,23 +5,22 @@ use nalgebra::DMatrix;
 
 use super::tile::{ROWS, Vectors, numbers, vectors};
 
-/// Partial sums of a product: as many as two vectors hold.
+/// Number of partial sums of a product: as many as two vectors hold.
 const PARTS: usize = ROWS;
-/// Columns of a tile.
+/// Number of columns in a tile.
 const COLUMNS: usize = 2;
 
 /// Partial sums of the products of a tile's columns.
 type Sums = [[[f64; PARTS]; COLUMNS]; COLUMNS];
 
-/// `AᵀA` (n × n) of a matrix given by its n columns. Digit for digit that of nalgebra: eight partial sums, then the rows that are
-/// left over.
+/// Returns `AᵀA` (n × n) of a matrix given by its n columns. Digit for digit that of nalgebra: eight partial sums, then the remaining rows.
 ///
-/// Panics where columns differ in length.
+/// Panics if columns differ in length.
 pub(crate) fn gram(columns: &[&[f64]]) -> DMatrix<f64> {
     gram_at(Level::new(), columns)
 }
 
-/// The product with the instructions of this level.
+/// Computes the product with the instructions of this level.
 fn gram_at(level: Level, columns: &[&[f64]]) -> DMatrix<f64> {
     let rows = columns.first().map_or(0, |column| column.len());
     assert!(columns.iter().all(|column| column.len() == rows), "columns of one length");
@@ -43,7 +42,8 @@ fn gram_at(level: Level, columns: &[&[f64]]) -> DMatrix<f64> {
     out
 }
 
-/// Partial sums over the rows that fill vectors. Written out: loops over arrays of vectors leave them in memory.
+/// Computes partial sums over the rows that fill vectors. The loops are unrolled by hand, because the compiler keeps arrays of vectors in
+/// memory.
 #[inline(always)]
 fn partial_sums<S: Simd>(simd: S, [a, b]: [&[f64]; COLUMNS], [c, d]: [&[f64]; COLUMNS]) -> Sums {
     let zero = [f64x4::splat(simd, 0.0); 2];
@@ -58,20 +58,20 @@ fn partial_sums<S: Simd>(simd: S, [a, b]: [&[f64]; COLUMNS], [c, d]: [&[f64]; CO
     [[numbers(ac), numbers(ad)], [numbers(bc), numbers(bd)]]
 }
 
-/// `sum + a b`, lane by lane.
+/// Returns `sum + a b`, lane by lane.
 #[inline(always)]
 fn plus<S: Simd>(sum: Vectors<S>, a: Vectors<S>, b: Vectors<S>) -> Vectors<S> {
     [sum[0] + a[0] * b[0], sum[1] + a[1] * b[1]]
 }
 
-/// The sum of the partial sums, and of the products that are left over.
+/// Adds up the partial sums and the products of the remaining rows.
 fn completed(parts: &[f64; PARTS], a: &[f64], b: &[f64]) -> f64 {
     let pairs = (0..PARTS / 2).fold(0.0, |sum, lane| sum + (parts[lane] + parts[PARTS / 2 + lane]));
     let (a, b) = (a.as_chunks::<PARTS>().1, b.as_chunks::<PARTS>().1);
     a.iter().zip(b).fold(pairs, |sum, (a, b)| sum + a * b)
 }
 
-/// The scalar product of two columns, digit for digit that of nalgebra.
+/// Returns the scalar product of two columns, digit for digit that of nalgebra.
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut parts = [0.0; PARTS];
     for (a, b) in a.as_chunks::<PARTS>().0.iter().zip(b.as_chunks::<PARTS>().0) {
@@ -86,7 +86,7 @@ mod tests {
     use fearless_simd::Level;
     use nalgebra::DMatrix;
 
-    /// Sizes that fill vectors and tiles, and do not, at the least level of the processor as at the best one.
+    /// Compares with nalgebra for sizes that do and do not fill vectors and tiles, at the lowest and the best level of the processor.
     #[test]
     fn the_products_are_nalgebras() {
         for (m, n) in [(0, 1), (5, 3), (8, 2), (41, 7), (64, 1)] {

@@ -1,7 +1,7 @@
 //! Dense matrices of a calibration: products and factors in vectors of four lanes, with the same digits on every processor.
 //!
-//! nalgebra's loops over matrices of variable size are scalar, and its product of large ones fuses multiplication and addition where
-//! the processor can.
+//! nalgebra's loops over matrices of variable size are scalar, and its product of large matrices fuses multiplication and addition on
+//! processors that support it.
 
 mod cholesky;
 mod gram;

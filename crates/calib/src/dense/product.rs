@@ -5,15 +5,15 @@ use nalgebra::{DMatrix, DMatrixView};
 
 use super::tile::{COLUMNS, ROWS, tile};
 
-/// `a b` (m × n of m × k and k × n). Each entry is summed up in order of k, without fused instructions: nalgebra's own product of
-/// large matrices takes those where the processor has some, and then a calibration ends in other last digits there.
+/// Returns `a b` (m × n of m × k and k × n). Each entry is summed in order of k, without fused instructions. nalgebra's own product of
+/// large matrices uses those where the processor has them, which changes the last digits of a calibration.
 ///
-/// Panics where the sizes do not fit.
+/// Panics if the sizes do not fit.
 pub(crate) fn product<'a, 'b>(a: impl Into<DMatrixView<'a, f64>>, b: impl Into<DMatrixView<'b, f64>>) -> DMatrix<f64> {
     product_at(Level::new(), &a.into(), &b.into())
 }
 
-/// The product with the instructions of this level.
+/// Computes the product with the instructions of this level.
 fn product_at(level: Level, a: &DMatrixView<f64>, b: &DMatrixView<f64>) -> DMatrix<f64> {
     assert_eq!(a.ncols(), b.nrows(), "columns of the first and rows of the second matrix");
     let mut out = DMatrix::zeros(a.nrows(), b.ncols());
@@ -30,7 +30,7 @@ fn product_at(level: Level, a: &DMatrixView<f64>, b: &DMatrixView<f64>) -> DMatr
     out
 }
 
-/// The rows from `start` on, column by column; zeros beyond the last row.
+/// Returns the rows from `start` on, column by column, with zeros beyond the last row.
 fn rows_of(a: &DMatrixView<f64>, start: usize) -> Vec<[f64; ROWS]> {
     let of_column = |k: usize| {
         let column = a.column(k);
@@ -40,7 +40,7 @@ fn rows_of(a: &DMatrixView<f64>, start: usize) -> Vec<[f64; ROWS]> {
     (0..a.ncols()).map(of_column).collect()
 }
 
-/// The columns from `start` on, row by row; zeros beyond the last column.
+/// Returns the columns from `start` on, row by row, with zeros beyond the last column.
 fn columns_of(b: &DMatrixView<f64>, start: usize) -> Vec<[f64; COLUMNS]> {
     let mut rows = vec![[0.0; COLUMNS]; b.nrows()];
     for (place, column) in b.columns_range(start..).column_iter().take(COLUMNS).enumerate() {
@@ -55,7 +55,7 @@ mod tests {
     use fearless_simd::Level;
     use nalgebra::DMatrix;
 
-    /// Rounded sums in order of k, at the least level of the processor as at the best one, of sizes that fill no tile.
+    /// Compares with rounded sums in order of k, at the lowest and the best level of the processor, for sizes that fill no tile.
     #[test]
     fn each_entry_is_a_sum_in_order() {
         for (m, k, n) in [(1, 1, 1), (9, 7, 5), (17, 40, 3), (8, 4, 4), (3, 0, 2)] {

@@ -2,7 +2,7 @@
 
 use fearless_simd::{Simd, SimdBase, f64x4};
 
-/// Lanes of a vector.
+/// Number of lanes in a vector.
 const LANES: usize = 4;
 /// Rows and columns of a tile.
 pub(super) const ROWS: usize = 2 * LANES;
@@ -13,7 +13,7 @@ pub(super) type Vectors<S> = [f64x4<S>; ROWS / LANES];
 /// Entries of a tile, column by column.
 pub(super) type Tile = [[f64; ROWS]; COLUMNS];
 
-/// `from + left right`, summed in order of the columns of `left` and without fused instructions; `left` is given column by column,
+/// Returns `from + left right`, summed in order of the columns of `left` and without fused instructions; `left` is given column by column,
 /// `right` row by row.
 #[inline(always)]
 pub(super) fn tile<S: Simd>(simd: S, from: &Tile, left: &[[f64; ROWS]], right: &[[f64; COLUMNS]]) -> Tile {
@@ -29,14 +29,14 @@ pub(super) fn tile<S: Simd>(simd: S, from: &Tile, left: &[[f64; ROWS]], right: &
     sums.map(numbers)
 }
 
-/// Two vectors of eight numbers.
+/// Returns eight numbers as two vectors.
 #[inline(always)]
 pub(super) fn vectors<S: Simd>(simd: S, numbers: &[f64; ROWS]) -> Vectors<S> {
     let (first, second) = numbers.split_at(LANES);
     [f64x4::from_slice(simd, first), f64x4::from_slice(simd, second)]
 }
 
-/// The numbers of two vectors.
+/// Returns the numbers of two vectors.
 #[inline(always)]
 pub(super) fn numbers<S: Simd>([first, second]: Vectors<S>) -> [f64; ROWS] {
     let mut numbers = [0.0; ROWS];

@@ -1,5 +1,5 @@
-//! Fusion of several channels that see one strain, learned from what each of them and regressions on all their readings say of blocks
-//! left out.
+//! Fusion of several channels that measure the same strain, learned from the estimates of each channel, and of regressions on all their
+//! readings, on held-out blocks.
 
 mod neighbours;
 mod readings;
@@ -19,42 +19,43 @@ use crate::sd_scale::sd_scale;
 use neighbours::Neighbours;
 use readings::{Readings, ReadingsRow};
 
-/// Blocks of each recording, left out one after another.
+/// Number of blocks of each recording, left out in turn.
 const BLOCKS: usize = 4;
-/// Rows of the calibration that a fusion keeps.
+/// Number of rows of the calibration that a fusion keeps.
 const KEPT_ROWS: usize = 320;
-/// Low-passes, in multiples of the time in which the strain changes by twice its standard deviation, and those that each regression sees.
+/// Time constants of low-passes, in multiples of the time in which the strain changes by twice its standard deviation, and the low-passes
+/// that each regression uses.
 const LOW_PASSES: [f64; 3] = [1.0 / 3.0, 1.0, 3.0];
 const REGRESSIONS: [&[usize]; 3] = [&[0], &[1], &[0, 2]];
-/// Shrinkage of the errors' correlations: blocks are few, errors of one block are alike.
+/// Shrinkage of the errors' correlations: blocks are few, and errors within one block are alike.
 const SHRINKAGE: f64 = 0.5;
 
-/// A channel with what its calibration found.
+/// A channel with the results of its calibration.
 #[derive(Clone, Copy, Debug)]
 pub struct FusionChannel<'a> {
-    /// Its recordings, row for row at the times of the other channels'.
+    /// Its recordings, with the same times, row by row, as those of the other channels.
     pub recordings: &'a [Samples<'a>],
     /// R₀ of the calibrated sensor.
     pub rest_reading: f64,
-    /// Its filter's estimates of parts left out.
+    /// Its filter's estimates of held-out parts.
     pub left_out: &'a [LeftOutRow],
 }
 
-/// A fusion with its quality on parts left out.
+/// A fusion with its quality on held-out parts.
 #[derive(Clone, Debug)]
 pub struct FusionFit {
     /// The fusion.
     pub params: FusionParams,
-    /// Scores of the fused estimate; `None` if the channels have no estimates of parts left out.
+    /// Scores of the fused estimate; `None` if the channels have no estimates of held-out parts.
     pub fused: Option<Scores>,
     /// Scores of each channel alone on the same rows.
     pub channels: Vec<Option<Scores>>,
 }
 
-/// Learns to fuse channels.
+/// Learns the fusion of channels.
 ///
 /// # Errors
-/// If there are less than two channels, if their recordings have other times, or if no row has readings of all channels and a strain.
+/// If there are fewer than two channels, if their times differ, or if no row has readings of all channels and a strain.
 pub fn fit_fusion(
     channels: &[FusionChannel],
     quantity: Quantity,
@@ -103,13 +104,13 @@ pub fn fit_fusion(
     Ok(FusionFit { fused, channels: (0..channels.len()).map(of_channel).collect(), params })
 }
 
-/// Fused estimates of judged rows.
+/// Returns the fused estimates of judged rows.
 fn fused(params: &FusionParams, judged: &[Judged], neighbours: &Neighbours) -> Vec<Option<Member>> {
     let members = params.error_covariance.len();
     judged.iter().map(|one| params.fused(&one.members[..members], neighbours.excess(one.row.place))).collect()
 }
 
-/// The parameters with the factor that makes the fused interval cover the worst block.
+/// Returns the parameters with the factor that makes the fused interval cover the worst block.
 fn scaled(params: FusionParams, judged: &[Judged], neighbours: &Neighbours) -> FusionParams {
     let mut blocks = vec![Vec::new(); BLOCKS];
     for (one, member) in judged.iter().zip(fused(&params, judged, neighbours)) {
@@ -118,7 +119,7 @@ fn scaled(params: FusionParams, judged: &[Judged], neighbours: &Neighbours) -> F
     FusionParams { sd_scale: sd_scale(&blocks), ..params }
 }
 
-/// Mean negative log density of the strain under the fused estimate.
+/// Returns the mean negative log density of the strain under the fused estimate.
 fn log_loss(params: &FusionParams, judged: &[Judged], neighbours: &Neighbours) -> f64 {
     let fused = fused(params, judged, neighbours);
     let losses = judged.iter().zip(&fused).map(|(one, member)| {
@@ -128,27 +129,27 @@ fn log_loss(params: &FusionParams, judged: &[Judged], neighbours: &Neighbours) -
     losses.sum::<f64>() / judged.len() as f64
 }
 
-/// The range of the strain.
+/// Returns the range of the strain.
 fn limits(recordings: &[Samples]) -> Result<RangeParams, CalibrationError> {
     let strains = || recordings.iter().flat_map(|samples| samples.strain).copied().filter(|strain| strain.is_finite());
     let (lower, upper) = (strains().fold(f64::INFINITY, f64::min), strains().fold(f64::NEG_INFINITY, f64::max));
     if lower < upper { Ok(RangeParams { lower, upper }) } else { Err(CalibrationError::NoCommonRows) }
 }
 
-/// Time constants for the motion of these recordings, s.
+/// Returns low-pass time constants for the motion of these recordings, s.
 fn low_passes(recordings: &[Samples]) -> Vec<f64> {
     let stats = MotionStats::new(recordings);
     let time_s = 2.0 * stats.strain_sd / stats.rate_sd.max(1e-12);
     LOW_PASSES.iter().map(|share| share * time_s).collect()
 }
 
-/// A row that every member has estimated without having seen its block.
+/// A row with the estimates of all members, each made without the row's block.
 struct Judged<'a> {
     row: &'a ReadingsRow,
     members: Vec<Member>,
 }
 
-/// Rows that all channels have estimated, with the regressions' estimates.
+/// Returns the rows that all channels have estimated, with the regressions' estimates.
 fn judged<'a>(channels: &[FusionChannel], readings: &'a Readings, regressions: &[Vec<Member>]) -> Vec<Judged<'a>> {
     let by_row = |channel: &FusionChannel| -> HashMap<(usize, usize), Member> {
         let of_row = |one: &LeftOutRow| ((one.recording, one.row), Member { strain: one.strain, sd: one.strain_sd });
@@ -164,8 +165,8 @@ fn judged<'a>(channels: &[FusionChannel], readings: &'a Readings, regressions: &
     readings.rows.iter().filter_map(of_row).collect()
 }
 
-/// Covariances about zero of the members' errors in units of their deviations. Correlations are shrunken toward none, and a member that errs
-/// less than it says is not believed more for it.
+/// Returns covariances about zero of the members' errors in units of their standard deviations. Correlations are shrunk toward zero, and a
+/// member that errs less than it states gets no extra weight.
 fn covariance(judged: &[Judged]) -> Vec<Vec<f64>> {
     let members = judged.first().map_or(0, |one| one.members.len());
     let mut sums = vec![vec![0.0; members]; members];
@@ -188,7 +189,7 @@ fn identity(members: usize) -> Vec<Vec<f64>> {
     (0..members).map(|i| (0..members).map(|j| f64::from(u8::from(i == j))).collect()).collect()
 }
 
-/// Scores of estimates of these rows.
+/// Scores estimates of these rows.
 fn score(judged: &[Judged], members: &[Option<Member>]) -> Option<Scores> {
     let row = |(one, member): (&Judged, &Option<Member>)| {
         let member = (*member)?;

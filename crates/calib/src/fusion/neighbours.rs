@@ -4,20 +4,20 @@ use super::readings::{Readings, ReadingsRow};
 use super::{BLOCKS, KEPT_ROWS};
 use crate::order::{median, sorted};
 
-/// Rounds in which the channels' typical differences are found, each with the distances of the one before.
+/// Number of iterations for the channels' typical differences, each with the distances of the one before.
 const ROUNDS: usize = 3;
-/// Median of |z| over the standard deviation, for a standard normal z.
+/// Standard deviation of a normal variable over the median of its absolute value.
 const MEDIAN_TO_SD: f64 = 1.4826;
-/// Least typical difference of ln R: a sensor that repeats its readings to the digit is still one that may differ by this.
+/// Least typical difference of ln R: even a sensor that repeats its readings to the digit may differ by this.
 const LEAST_SD: f64 = 1e-4;
-/// Share of rows, per cent, that are as near to the calibration's as [`Neighbours::novelty`].
+/// Share of the calibration's rows, per cent, within the distance [`Neighbours::novelty`].
 const USUAL: usize = 99;
 
 /// Distances of readings from the nearest readings of other blocks.
 pub(super) struct Neighbours {
     /// Typical difference of ln R of each channel between rows in which the others agree.
     pub channel_sd: Vec<f64>,
-    /// Distance that one row in a hundred exceeds.
+    /// Distance that one row in a hundred exceeds, at least 1.
     pub novelty: f64,
     /// Distance of each row.
     distances: Vec<f64>,
@@ -42,20 +42,21 @@ impl Neighbours {
         Self { channel_sd, novelty, distances }
     }
 
-    /// Novelty of a row among those of other blocks, 0 to 1.
+    /// Returns the novelty of a row relative to those of other blocks, 0 to 1.
     pub(super) fn excess(&self, place: usize) -> f64 {
         (self.distances[place] / self.novelty - UNLIKE).clamp(0.0, 1.0)
     }
 }
 
-/// Standard deviation of a channel's ln R.
+/// Returns the standard deviation of a channel's ln R.
 fn spread(readings: &Readings, channel: usize) -> f64 {
     let values = || readings.rows.iter().map(|row| row.seen.ln_r[channel]);
     let mean = values().sum::<f64>() / readings.rows.len() as f64;
     (values().map(|value| (value - mean).powi(2)).sum::<f64>() / readings.rows.len() as f64).sqrt().max(LEAST_SD)
 }
 
-/// Typical difference of a channel's ln R between a row and the one of other blocks that the other channels are nearest to.
+/// Returns the typical difference of a channel's ln R between a row and the row of other blocks that is nearest to it in the other
+/// channels.
 fn difference(readings: &Readings, others: &[Vec<&ReadingsRow>], channel_sd: &[f64], channel: usize) -> f64 {
     let differences = readings.thinned(|_| true, 4 * KEPT_ROWS).map(|row| {
         let mut without = row.seen.ln_r.clone();

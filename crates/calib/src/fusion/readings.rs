@@ -3,7 +3,7 @@ use ohmstrain_sensor::fusion::{FusionRow, LowPasses};
 use super::{BLOCKS, FusionChannel};
 use crate::CalibrationError;
 
-/// Rows in which all channels were read and the strain is known.
+/// Rows with readings of all channels and a known strain.
 pub(super) struct Readings {
     pub rows: Vec<ReadingsRow>,
     pub channels: usize,
@@ -11,13 +11,13 @@ pub(super) struct Readings {
 
 /// One of these rows.
 pub(super) struct ReadingsRow {
-    /// Its place among them.
+    /// Its index among them.
     pub place: usize,
     pub recording: usize,
     /// The row of that recording.
     pub row: usize,
     pub time_s: f64,
-    /// The block that it is left out with.
+    /// The block with which it is left out.
     pub block: usize,
     pub seen: FusionRow,
 }
@@ -57,7 +57,7 @@ impl Readings {
         }
     }
 
-    /// Some of these rows, `most` at most, evenly.
+    /// Returns at most `most` of these rows, evenly spread.
     pub(super) fn thinned(
         &self,
         wanted: impl Fn(&ReadingsRow) -> bool,

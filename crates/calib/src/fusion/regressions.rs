@@ -5,14 +5,14 @@ use super::readings::{Readings, ReadingsRow};
 use super::{BLOCKS, KEPT_ROWS, REGRESSIONS};
 use crate::CalibrationError;
 
-/// Length scales that are tried, in standard deviations of the input.
+/// Length scales tried, in standard deviations of the input.
 const LENGTHS: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
-/// Standard deviations of the noise that are tried, as shares of the range of the strain.
+/// Standard deviations of the noise tried, as fractions of the strain's range.
 const NOISES: [f64; 3] = [0.01, 0.02, 0.04];
-/// Rows of each block that settings are judged on.
+/// Number of rows of each block on which settings are judged.
 const JUDGED_ROWS: usize = 200;
 
-/// Settings of each regression, and its estimates of every row without the block of that row.
+/// Fits the settings of each regression, and estimates every row without its block.
 pub(super) fn fit(
     readings: &Readings,
     span: f64,
@@ -32,7 +32,7 @@ pub(super) fn fit(
     Ok((chosen, left_out.ok_or(CalibrationError::NoCommonRows)?))
 }
 
-/// Mean negative log density of the strain in blocks left out; `None` if the regression cannot be made.
+/// Returns the mean negative log density of the strain in held-out blocks; `None` if the regression cannot be made.
 fn score(readings: &Readings, params: &RegressionParams, span: f64) -> Option<f64> {
     let (mut sum, mut count) = (0.0, 0_usize);
     for block in 0..BLOCKS {
@@ -46,7 +46,7 @@ fn score(readings: &Readings, params: &RegressionParams, span: f64) -> Option<f6
     Some(sum / count.max(1) as f64)
 }
 
-/// Estimates of every row by a regression that has not seen its block.
+/// Estimates every row by a regression that was fitted without its block.
 fn left_out(readings: &Readings, params: &RegressionParams, span: f64) -> Option<Vec<Member>> {
     let regressions: Option<Vec<Regression>> =
         (0..BLOCKS).map(|block| without(readings, params, block, span)).collect();

@@ -1,5 +1,5 @@
-//! Advice on the next recording, as motions of a rig: what moves, how fast, how long. Speeds are given as the duration of a stroke over the
-//! whole range, so that they hold for strains and angles.
+//! Advice on the next recording, as motions of a rig: which motion, its speed and its duration. Speeds are stated as the duration of a
+//! stroke over the whole range, so that they apply to strains and angles alike.
 
 use nalgebra::{Cholesky, DMatrix};
 
@@ -7,34 +7,34 @@ use crate::likelihood::Bound;
 use crate::motion_stats::MotionStats;
 use ohmstrain_sensor::{RangeParams, Uncertainty};
 
-/// A time constant with a larger standard error than this, relative to itself, is not identified: a 95 % interval from
-/// half to twice the value is about 0.35.
+/// Standard error of a time constant, relative to its value, above which it is not identified. A 95 % interval from half to twice the value
+/// corresponds to about 0.35.
 const LEAST_SURE: f64 = 0.25;
-/// Speeds count as one where the middle half of the moving rows lies within this ratio.
+/// Ratio of speeds that still counts as one speed, for the middle half of the moving rows.
 const ONE_SPEED: f64 = 1.15;
-/// The variance of a weight may be this many times what it were if its column stood alone; the usual rule.
+/// Largest variance inflation of a weight, relative to a column that stands alone; the usual rule.
 const LARGEST_INFLATION: f64 = 10.0;
-/// Least way back of a release, as a share of the way, that carries information on the law of release.
+/// Least distance of release, as a fraction of the distance of stretching, that determines the law of release.
 const LEAST_BACK: f64 = 0.1;
-/// Fewer strokes over the whole range do not repeat, so that none can be left out.
+/// Least number of strokes over the whole range; fewer do not repeat, so that none can be left out.
 const FEWEST_STROKES: f64 = 6.0;
-/// Shorter recordings have no quarter of 15 s to be left out, s.
+/// Shortest recording, s, with quarters of 15 s to leave out.
 const SHORTEST_S: f64 = 60.0;
-/// Strain not recorded between zero and the least strain, in spans, beyond which R₀ is an extrapolation.
+/// Unrecorded strain between zero and the least strain, in spans, beyond which R₀ is an extrapolation.
 const FAR_FROM_REST: f64 = 0.1;
 
-/// A time constant that ends on a bound of its search.
+/// A time constant that is on a bound of its search.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OnBound {
     /// Its name.
     pub name: String,
     /// Its value, s.
     pub value: f64,
-    /// The bound: the pace of the motion below, a quarter of the longest recording above.
+    /// The bound: the lower one is the pace of the motion, the upper one a quarter of the longest recording.
     pub bound: Bound,
 }
 
-/// Motions to record next, most important first.
+/// Returns motions to record next, most important first.
 pub(crate) fn advice(
     parameters: &Uncertainty,
     on_bound: &[OnBound],
@@ -56,7 +56,7 @@ pub(crate) fn advice(
     reasons.into_iter().flatten().collect()
 }
 
-/// Advises more releases, or stretches, if there are too few of one kind: only they determine their law.
+/// Advises more releases, or stretches, if there are too few of either to determine their law.
 fn both_directions(stats: &MotionStats, stroke_s: f64) -> Option<String> {
     let [stretched, released] = stats.distances;
     let stroke = duration(stroke_s);
@@ -67,7 +67,7 @@ fn both_directions(stats: &MotionStats, stroke_s: f64) -> Option<String> {
         .then(|| format!("stretch as often as you release: up to the largest strain, in {stroke} a stroke"))
 }
 
-/// A block that is left out to test a law must be a motion, too.
+/// Advises more strokes if a block that is left out to test a law would not contain a motion.
 fn enough_strokes(stats: &MotionStats, range: RangeParams, stroke_s: f64) -> Option<String> {
     let strokes = (stats.distances[0] + stats.distances[1]) / range.span().max(f64::MIN_POSITIVE);
     if strokes < FEWEST_STROKES {
@@ -83,7 +83,7 @@ fn enough_strokes(stats: &MotionStats, range: RangeParams, stroke_s: f64) -> Opt
     })
 }
 
-/// Otherwise R₀ is an extrapolation.
+/// Advises rest near zero strain if R₀ would otherwise be an extrapolation.
 fn near_zero(range: RangeParams) -> Option<String> {
     let least = range.lower.abs().min(range.upper.abs());
     (least > FAR_FROM_REST * range.span() && range.lower * range.upper > 0.0).then(|| {
@@ -94,7 +94,7 @@ fn near_zero(range: RangeParams) -> Option<String> {
     })
 }
 
-/// Returns the longest time constant, s, that is poorly determined, or ends on the bound that the recording's length sets.
+/// Returns the longest time constant, s, that is poorly determined or on the bound set by the recording's length.
 fn slow_relaxation(parameters: &Uncertainty, on_bound: &[OnBound]) -> Option<f64> {
     let all = parameters.names.iter().zip(&parameters.values).zip(&parameters.standard_errors);
     let open = all.filter(|((name, tau_s), error_s)| {
@@ -133,8 +133,8 @@ fn faster(range: RangeParams, stats: &MotionStats) -> String {
     format!("add strokes in {faster}, with as many rows a stroke: the fastest so far would take {fastest}")
 }
 
-/// The dash-pot is a jump of the reading by an amount that depends on the speed. At one speed it is a constant of each
-/// direction, which R₀, the gauge and fast branches can take on.
+/// True if only one speed was recorded. The dash-pot is a jump of the reading that depends on the speed. At one speed it is a constant for
+/// each direction, which R₀, the gauge and fast branches can absorb.
 fn is_one_speed(parameters: &Uncertainty, stats: &MotionStats, jacobian: &DMatrix<f64>) -> bool {
     let (slow, fast) = stats.quartile_speeds;
     let Some(linear_before) = jacobian.ncols().checked_sub(trailing_columns(parameters)) else { return false };
@@ -143,30 +143,31 @@ fn is_one_speed(parameters: &Uncertainty, stats: &MotionStats, jacobian: &DMatri
     fast <= ONE_SPEED * slow && worst > LARGEST_INFLATION
 }
 
-/// Columns from the dash-pot on: two of it, four and a time constant of each branch, the gauge's nonlinear parameters.
+/// Returns the number of columns from the dash-pot on: two of its own, four and a time constant of each branch, the gauge's nonlinear
+/// parameters.
 fn trailing_columns(parameters: &Uncertainty) -> usize {
     let count = |wanted: &dyn Fn(&str) -> bool| parameters.names.iter().filter(|name| wanted(name)).count();
     let gauge = count(&|name| matches!(name, "gauge.decay_strain" | "gauge.gap" | "gauge.barrier" | "gauge.path_loss"));
     2 + count(&|name| name.starts_with("branches[")) + gauge
 }
 
-/// JᵀJ with columns of unit length; a column of zeros stays one.
+/// Returns JᵀJ with columns of unit length; a column of zeros stays zero.
 pub(crate) fn scaled_normal(jacobian: &DMatrix<f64>) -> DMatrix<f64> {
     let lengths: Vec<f64> = jacobian.column_iter().map(|column| column.norm().max(f64::MIN_POSITIVE)).collect();
     let normal = jacobian.tr_mul(jacobian);
     DMatrix::from_fn(normal.nrows(), normal.ncols(), |i, j| normal[(i, j)] / (lengths[i] * lengths[j]))
 }
 
-/// Diagonal of the inverse of the scaled normal matrix: 1 for a column at right angles to all others.
+/// Returns the diagonal of the inverse of the scaled normal matrix: 1 for a column orthogonal to all others.
 fn variance_inflation(jacobian: &DMatrix<f64>) -> Vec<f64> {
     let size = jacobian.ncols();
-    // Far above rounding and far below what counts as inflated.
+    // Far above rounding, and far below the inverse of any relevant inflation.
     let normal = scaled_normal(jacobian) + DMatrix::identity(size, size) * 1e-10;
     Cholesky::new(normal)
         .map_or(vec![f64::INFINITY; size], |factor| factor.inverse().diagonal().iter().copied().collect())
 }
 
-/// Formats a duration for people: two figures of seconds, minutes or hours.
+/// Formats a duration for people: two digits of seconds, minutes or hours.
 fn duration(seconds: f64) -> String {
     match seconds {
         s if s < 100.0 => format!("{} s", number(s)),
@@ -175,7 +176,7 @@ fn duration(seconds: f64) -> String {
     }
 }
 
-/// Two or three figures, as people read them.
+/// Formats a number for people: two or three digits.
 fn number(x: f64) -> String {
     let size = x.abs();
     if size >= 10.0 {
@@ -211,7 +212,7 @@ mod tests {
 
     const RANGE: RangeParams = RangeParams { lower: 0.0, upper: 0.3 };
 
-    /// Two pieces of advice and a count of what else there is take two of the ten lines that end a calibration.
+    /// The end of a calibration has ten lines, of which two pieces of advice and a count of the rest take two.
     #[test]
     fn advice_is_short() {
         let holds = [0.0, 0.123, 5000.0].map(|hold_s| long_holds(3086.4, &stats(hold_s)).unwrap());
@@ -225,7 +226,7 @@ mod tests {
         }
     }
 
-    /// A lack of a recording, and the motion that mends it.
+    /// Tests each deficiency of a recording with the motion that remedies it.
     #[test]
     fn what_is_lacking_is_asked_for() {
         let with = |distances, longest_s| MotionStats { distances, longest_s, ..stats(0.0) };

@@ -15,7 +15,7 @@ pub(crate) struct BlockedNormal {
 }
 
 impl BlockedNormal {
-    /// `columns` (the constant first) and `response` over all rows; `blocks` are row ranges that partition them.
+    /// Builds the equations from `columns` (the constant first) and `response` over all rows; `blocks` are row ranges that partition them.
     pub(crate) fn new(
         columns: &[DVector<f64>],
         free: usize,
@@ -35,14 +35,14 @@ impl BlockedNormal {
         Self { free, blocks, total, scale }
     }
 
-    /// Ridge regression on `columns`, without the blocks of `left_out`; one weight per column. `ridge` is relative to
-    /// each column's variance.
+    /// Returns the ridge regression on `columns`, without the blocks of `left_out`; one weight per column. `ridge` is relative to each
+    /// column's variance.
     pub(crate) fn fit(&self, columns: &[usize], ridge: f64, left_out: &[usize]) -> Option<DVector<f64>> {
         self.solve(&self.without(left_out), columns, ridge)
     }
 
-    /// The most probable weights of all columns, without the blocks of `left_out`: those that are penalised are normal around
-    /// zero with this precision, in terms of a row's.
+    /// Returns the most probable weights of all columns, without the blocks of `left_out`. The penalised ones have a normal prior around
+    /// zero with this precision, in units of the precision of a row.
     pub(crate) fn fit_normal(&self, precision: &DMatrix<f64>, left_out: &[usize]) -> Option<DVector<f64>> {
         let mut gram = self.without(left_out);
         let mut penalised = gram.view_mut((self.free, self.free), precision.shape());
@@ -50,12 +50,12 @@ impl BlockedNormal {
         self.solve(&gram, &(0..self.scale.len() - 1).collect::<Vec<_>>(), 0.0)
     }
 
-    /// Mean squared error on blocks left out in turn, each block's mean removed.
+    /// Returns the mean squared error on blocks left out in turn, each block's mean removed.
     pub(crate) fn cross_validate(&self, columns: &[usize], ridge: f64) -> Option<f64> {
         self.left_out_variance(columns, |block| self.fit(columns, ridge, &[block]))
     }
 
-    /// The same for weights of columns that are fitted in another way.
+    /// Returns the same error for weights that `fit_without` fits without a block.
     pub(crate) fn left_out_variance(
         &self,
         columns: &[usize],
@@ -72,8 +72,8 @@ impl BlockedNormal {
         left_out.iter().fold(self.total.clone(), |rest, &block| rest - &self.blocks[block])
     }
 
-    /// Mean squared error over the rows of all blocks, left out in turn, offsets and all: for regressions that have
-    /// nothing to catch an offset with.
+    /// Returns the mean squared error over the rows of all blocks left out in turn, offsets included, for regressions that cannot absorb an
+    /// offset.
     pub(crate) fn left_out_error(&self, columns: &[usize], ridge: f64) -> Option<f64> {
         let mut sum = 0.0;
         for (b, block) in self.blocks.iter().enumerate() {
@@ -100,14 +100,14 @@ impl BlockedNormal {
     }
 }
 
-/// Variance of the residual in a block: a constant offset is what the filter's baseline is there for.
+/// Returns the variance of the residual in a block; the filter's baseline absorbs a constant offset.
 fn block_error(block: &DMatrix<f64>, columns: &[usize], weights: &DVector<f64>) -> f64 {
     let rows = block[(0, 0)];
     let (sum, squares) = residual_sums(block, columns, weights);
     (squares / rows - (sum / rows).powi(2)).max(0.0)
 }
 
-/// Sum of the residuals in a block, and of their squares.
+/// Returns the sum of the residuals in a block, and that of their squares.
 fn residual_sums(block: &DMatrix<f64>, columns: &[usize], weights: &DVector<f64>) -> (f64, f64) {
     let response = block.ncols() - 1;
     let (mut sum, mut squares) = (block[(0, response)], block[(response, response)]);

@@ -15,22 +15,22 @@ use ohmstrain_sensor::LawParams;
 pub struct Bootstrap {
     /// Names of the parameters.
     pub names: Vec<String>,
-    /// Their values by least squares without a ridge on the recordings as they are.
+    /// Their values on the recordings as they are, by least squares without a ridge.
     pub values: Vec<f64>,
     /// 2.5 % points.
     pub lower: Vec<f64>,
     /// 97.5 % points.
     pub upper: Vec<f64>,
-    /// Fits that went into them; the others were singular.
+    /// Number of replicates used; the others were singular.
     pub replicates: usize,
 }
 
-/// Blocks that a recording is cut into. They must be longer than residuals remember and many enough to draw from.
+/// Number of blocks of a recording. They must be longer than the correlation time of the residuals, and many enough to draw from.
 const BOOTSTRAP_BLOCKS: usize = 40;
 
-/// Draws the blocks of every recording with replacement, `replicates` times, and fits the structure of `law` to each draw
-/// by least squares without a ridge, which would pull all draws to the same side. A row keeps what the sensor remembered of
-/// the true history before it; only which rows count is drawn. The same `seed` gives the same intervals.
+/// Draws the blocks of every recording with replacement, `replicates` times, and fits the structure of `law` to each draw by least squares
+/// without a ridge, which would pull all draws to the same side. Each row keeps the sensor's memory of the true history before it; the draw
+/// only selects the rows that count. The same `seed` gives the same intervals.
 ///
 /// Source: Künsch, *Ann. Statist.* 17 (1989) 1217, with blocks that do not overlap (Carlstein 1986).
 ///
@@ -75,7 +75,7 @@ fn draw(rows: &[usize], rng: &mut ChaCha12Rng) -> Vec<usize> {
     out
 }
 
-/// Linear between order statistics.
+/// Returns a quantile, linear between order statistics.
 fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
     let sorted = sorted(values);
     let at = share * (sorted.len() - 1) as f64;

@@ -6,7 +6,7 @@ use crate::law::structure::GaugeFamily;
 use crate::law::structure::LawStructure;
 use crate::samples::Samples;
 
-/// Fit of a structure of the law to recordings, and the cost of its parameters.
+/// Fit of a structure of the law to recordings, with criteria that penalise its parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StructureScore {
     /// The structure.
@@ -23,11 +23,10 @@ pub struct StructureScore {
     pub bic: f64,
 }
 
-/// Most branches compared.
+/// Largest number of branches compared.
 const MOST_BRANCHES: usize = 3;
 
-/// Fits every structure with up to three branches, with the least ridge, and compares them; structures that cannot be fitted are
-/// left out.
+/// Fits every structure with up to three branches, with the least ridge, and compares them. Structures that cannot be fitted are omitted.
 ///
 /// Residuals of such laws are correlated over seconds. The criteria count rows as if they were independent, so the rows
 /// are first reduced to the number of independent ones, `n (1 - r)/(1 + r)` with the residuals' correlation r from row to

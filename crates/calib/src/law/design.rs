@@ -2,8 +2,8 @@ use nalgebra::DVector;
 
 use crate::samples::{Samples, central_rate, filled_strain};
 
-/// The known strain of one recording as regressors of the law: with the time constants given, ρ is linear in
-/// everything else.
+/// The known strain of one recording as regressors of the law: with the time constants given, ρ is linear in all other
+/// parameters.
 ///
 /// Strain is scaled to `x = (ε - centre)/span` so that every column is of order one.
 pub(crate) struct Regressors {
@@ -13,7 +13,7 @@ pub(crate) struct Regressors {
     rate: Vec<f64>,
 }
 
-/// Columns of one branch: stretching and releasing, constant and growing with strain.
+/// Number of columns of one branch: stretching and releasing, constant and proportional to strain.
 pub(crate) const BRANCH_COLUMNS: usize = 4;
 
 /// Centre and span of the strain.
@@ -37,19 +37,19 @@ impl Regressors {
         Self { time_s: samples.time_s.to_vec(), strain, scaled, rate }
     }
 
-    /// A function of the strain.
+    /// Evaluates a function of the strain in every row.
     pub(crate) fn of_strain(&self, f: impl Fn(f64) -> f64) -> DVector<f64> {
         DVector::from_iterator(self.strain.len(), self.strain.iter().map(|&strain| f(strain)))
     }
 
-    /// Dash-pot: rate while stretching and while releasing, in spans per second.
+    /// Returns the dash-pot columns: rate while stretching and while releasing, in spans per second.
     pub(crate) fn viscosity(&self) -> [DVector<f64>; 2] {
         let column = |pick: fn(f64) -> f64| DVector::from_iterator(self.rate.len(), self.rate.iter().map(|&v| pick(v)));
         [column(|v| v.max(0.0)), column(|v| v.min(0.0))]
     }
 
-    /// The four columns of a branch of unit gain with time constant `tau_s`: answers to stretching, to releasing, and
-    /// both weighted with the scaled mid-strain. Exact for strain that moves linearly between rows.
+    /// Returns the four columns of a branch of unit gain with time constant `tau_s`: responses to stretching and to
+    /// releasing, and both weighted with the scaled mid-strain. Exact for strain that is linear between rows.
     pub(crate) fn branch(&self, tau_s: f64) -> [DVector<f64>; BRANCH_COLUMNS] {
         let rows = self.time_s.len();
         let mut columns: [DVector<f64>; BRANCH_COLUMNS] = std::array::from_fn(|_| DVector::zeros(rows));

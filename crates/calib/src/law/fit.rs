@@ -24,8 +24,8 @@ impl Default for LawOptions {
 }
 
 impl LawOptions {
-    /// Returns the structures that a calibration for this estimator chooses from by default: one to three branches for
-    /// those that were seen to gain from the choice, two for the others.
+    /// Returns the structures from which a calibration for this estimator chooses by default: one to three branches for estimators that
+    /// gain from the choice, two for the others.
     #[must_use]
     pub const fn candidates(kind: EstimatorKind) -> &'static [Self] {
         const TWO: LawOptions = LawOptions::with_branches(DEFAULT_BRANCHES);
@@ -41,37 +41,36 @@ impl LawOptions {
     }
 }
 
-/// A law, and the same law fitted again without each block of the recordings: what the law is worth where it was not
-/// fitted.
+/// A law, and the same law fitted again without each block of the recordings, which measures its error outside the rows of the fit.
 #[derive(Clone, Debug)]
 pub struct CrossFit {
-    /// Fitted to everything.
+    /// Law fitted to all rows.
     pub law: LawFit,
-    /// Fitted without block k of every recording.
+    /// Laws fitted without block k of every recording.
     pub without_block: Vec<LawFit>,
     /// Rows of the blocks, `blocks[recording][k]`.
     pub blocks: Vec<Vec<std::ops::Range<usize>>>,
 }
 
-/// Branches of a law that is fitted by itself.
+/// Number of branches of a law that is fitted by itself.
 const DEFAULT_BRANCHES: usize = 2;
-/// Default family. Others sometimes follow the resistance a little better; only the polynomial
-/// is linear in its coefficients, so that the ridge keeps it tame and the filter from taking one direction for the other.
+/// Default family. Others sometimes follow the resistance slightly better, but only the polynomial is linear in its coefficients: the ridge
+/// then keeps it smooth, and the filter does not confuse directions.
 const DEFAULT_GAUGE: GaugeFamily = GaugeFamily::Polynomial;
-/// Time constants tried.
+/// Number of time constants on the grid.
 const GRID: usize = 12;
-/// Ridges tried, relative to the variance of each column. The least one explains most and often makes a filter lock onto
-/// the wrong direction; each estimator's own score chooses among them.
+/// Ridges tried, relative to the variance of each column. The least one explains most, but often makes a filter lock onto the wrong
+/// direction; each estimator chooses by its own score.
 const LAW_RIDGES: [f64; 5] = [0.1, 0.03, 0.01, 0.003, 0.001];
 /// Steps of the polish of the time constants, and the side of its first simplex in ln τ.
 const POLISH_STEPS: u64 = 40;
 const POLISH_SIDE: f64 = 0.3;
-/// Smallest distance between time constants on the grid, in ln τ, where there is room: closer ones trade their gains off
-/// against each other. The polish may halve it.
+/// Smallest distance between time constants on the grid, in ln τ, if the bounds allow it: closer ones trade off their gains. The polish may
+/// halve it.
 const LEAST_SPACING: f64 = 1.6;
 
-/// Fits the switched Kelvin-Voigt law with gains affine in strain: separable least squares, searching the time
-/// constants on a grid and then locally, everything else by ridge regression.
+/// Fits the switched Kelvin-Voigt law with gains affine in strain, by separable least squares: the time constants are searched on a grid
+/// and then locally, all other parameters follow from ridge regression.
 ///
 /// Time constants and ridge come from cross-validation on contiguous blocks.
 ///
@@ -84,13 +83,13 @@ pub fn fit_law(recordings: &[Samples], options: LawOptions) -> Result<CrossFit, 
 }
 
 impl CrossFit {
-    /// Number of branches.
+    /// Returns the number of branches.
     pub(crate) fn branches(&self) -> usize {
         self.law.law.branches.len()
     }
 }
 
-/// The best law for each structure and ridge, fewest branches and strongest ridge first; at least one.
+/// Returns the best law for each structure and ridge, fewest branches and strongest ridge first; at least one.
 pub(crate) fn fit_laws(recordings: &[Samples], structures: &[LawOptions]) -> Result<Vec<CrossFit>, CalibrationError> {
     let fits: Vec<_> = structures.iter().map(|structure| fit_ridges(recordings, *structure)).collect();
     if fits.iter().all(Result::is_err) {
@@ -101,7 +100,7 @@ pub(crate) fn fit_laws(recordings: &[Samples], structures: &[LawOptions]) -> Res
     Ok(laws)
 }
 
-/// The best law for each ridge, strongest ridge first; at least one.
+/// Returns the best law for each ridge, strongest ridge first; at least one.
 fn fit_ridges(recordings: &[Samples], options: LawOptions) -> Result<Vec<CrossFit>, CalibrationError> {
     if options.branches > MOST_BRANCHES {
         return Err(ohmstrain_sensor::SensorError::Branches { found: options.branches }.into());
@@ -128,7 +127,7 @@ fn cross_fit(
     Ok(CrossFit { law: structure.fit(regression, None)?, without_block, blocks: regression.block_rows() })
 }
 
-/// The structure on the grid of time constants that cross-validation chooses with this ridge.
+/// Returns the structure that cross-validation with this ridge chooses on the grid of time constants.
 pub(crate) fn structure_on_grid(
     regression: &LawRegression,
     LawOptions { branches, gauge: family }: LawOptions,
@@ -137,7 +136,7 @@ pub(crate) fn structure_on_grid(
     Ok(LawStructure { family, nonlinear: TauGrid::new(regression, branches).best(ridge)?, taus: branches, ridge })
 }
 
-/// One structure with the least ridge.
+/// Fits one structure with the least ridge.
 pub(crate) fn fit_structure(
     regression: &LawRegression,
     options: LawOptions,
@@ -149,7 +148,7 @@ pub(crate) fn fit_structure(
     Ok((structure, fit))
 }
 
-/// A cubic gauge with branches of all time constants of a grid, ready to be fitted with any few of them.
+/// A cubic gauge with branches of all time constants of a grid, for fits with a few of them.
 struct TauGrid {
     ln_taus: Vec<f64>,
     normal: BlockedNormal,
@@ -174,7 +173,7 @@ impl TauGrid {
         }
     }
 
-    /// The best logarithms of time constants by cross-validation.
+    /// Returns the best logarithms of time constants by cross-validation.
     fn best(&self, ridge: f64) -> Result<Vec<f64>, CalibrationError> {
         let score = |subset: &Vec<usize>| {
             let mut columns: Vec<usize> = (0..self.first_branch).collect();
@@ -189,7 +188,7 @@ impl TauGrid {
     }
 }
 
-/// Moves time constants and gauge parameters to where cross-validation is best.
+/// Moves time constants and gauge parameters to the minimum of the cross-validation error.
 fn polish(
     regression: &LawRegression,
     family: GaugeFamily,
@@ -204,7 +203,7 @@ fn polish(
     });
     let structure =
         |nonlinear: &[f64]| LawStructure { family, nonlinear: nonlinear.to_vec(), taus: ln_taus.len(), ridge };
-    // The grid ends on the bounds, give or take a rounding.
+    // The ends of the grid are the bounds, up to rounding.
     let (low, high) = (regression.tau_bounds.0.ln() - 1e-9, regression.tau_bounds.1.ln() + 1e-9);
     let least = ln_taus.windows(2).map(|pair| pair[1] - pair[0]).fold(LEAST_SPACING, f64::min);
     let spacing = 0.5 * least;
@@ -220,13 +219,13 @@ fn polish(
     Ok(structure(&point))
 }
 
-/// `count` logarithms, evenly spaced between the logarithms of the bounds.
+/// Returns `count` logarithms, evenly spaced between those of the bounds.
 fn log_grid(bounds: (f64, f64), count: usize) -> Vec<f64> {
     let (low, high) = (bounds.0.ln(), bounds.1.ln());
     (0..count).map(|i| low + (high - low) * i as f64 / (count - 1) as f64).collect()
 }
 
-/// All ascending choices of `count` out of `0..size`.
+/// Returns all ascending choices of `count` out of `0..size`.
 fn subsets(size: usize, count: usize) -> Vec<Vec<usize>> {
     if count == 0 {
         return vec![vec![]];

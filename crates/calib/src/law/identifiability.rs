@@ -13,30 +13,31 @@ use crate::motion_stats::MotionStats;
 use crate::samples::Samples;
 use ohmstrain_sensor::{LawParams, Uncertainty};
 
-/// Identifiability of a law's parameters from recordings, and what to record so that they tell more.
+/// Identifiability of a law's parameters from recordings, with advice on recordings that would determine them better.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Identifiability {
     /// Parameters by least squares without a ridge, with standard errors by the block jackknife.
     pub parameters: Uncertainty,
-    /// Correlations of the parameters, row by row.
+    /// Correlation matrix of the parameters, row by row.
     pub correlation: Vec<Vec<f64>>,
-    /// Condition number of the normal matrix, its columns scaled to unit length: beyond 1e10 or so some combination of
-    /// parameters is not determined at all.
+    /// Condition number of the normal matrix with columns scaled to unit length; beyond about 1e10 some combination of parameters is not
+    /// determined at all.
     pub condition_number: f64,
-    /// Time constants that end on a bound.
+    /// Time constants that are on a bound.
     pub on_bound: Vec<OnBound>,
     /// Advice on the next recording, in words; empty if nothing stands out.
     pub advice: Vec<String>,
 }
 
-/// A time constant this near to a bound, in its logarithm, ends there.
+/// Distance from a bound, in ln τ, at which a time constant counts as being on it.
 const NEAR: f64 = 1e-3;
-/// Correlations reported in words are the strongest ones.
+/// Number of strongest correlations reported in words.
 const STRONGEST: usize = 5;
 
 /// Examines the information of `recordings` about the parameters of `law`, which was fitted to them.
 ///
-/// The ridge of the fit hides what a recording leaves open. Here the law is fitted again without it, from where it is.
+/// The ridge of the fit hides which parameters a recording leaves undetermined. Here the law is fitted again without it, from its present
+/// values.
 ///
 /// # Errors
 /// If the recordings are too short, the strain is constant or the equations are singular.
@@ -63,13 +64,13 @@ pub fn identifiability(recordings: &[Samples], law: &LawParams) -> Result<Identi
 
 fn condition_number(jacobian: &DMatrix<f64>) -> f64 {
     let eigenvalues = scaled_normal(jacobian).symmetric_eigenvalues();
-    // What rounding leaves of a zero may be negative.
+    // Rounding may make a zero eigenvalue negative.
     eigenvalues.max() / eigenvalues.min().max(f64::EPSILON * eigenvalues.max())
 }
 
 impl Identifiability {
-    /// Returns the parameters without the ridge, except time constants that end on a bound: a recording does not determine those, and
-    /// their standard errors measure how well the bound is known.
+    /// Returns the parameters without the ridge, except time constants on a bound: a recording does not determine those, and their standard
+    /// errors measure how well the bound is known.
     #[must_use]
     pub fn off_bounds(&self) -> Uncertainty {
         let Uncertainty { names, values, standard_errors, covariance } = &self.parameters;
@@ -84,7 +85,7 @@ impl Identifiability {
         }
     }
 
-    /// The most strongly correlated pairs of parameters, strongest first.
+    /// Returns the most strongly correlated pairs of parameters, strongest first.
     #[must_use]
     pub fn strongest_correlations(&self) -> Vec<(&str, &str, f64)> {
         let names = &self.parameters.names;

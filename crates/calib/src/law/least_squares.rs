@@ -6,24 +6,24 @@ use crate::law::structure::LawStructure;
 use crate::law::uncertainty::Linearised;
 use ohmstrain_sensor::LawParams;
 
-/// Ridge that keeps indistinguishable columns from making the equations singular, and does nothing else: a parameter with a
-/// standard error below a thousandth of the response's spread moves by less than a thousandth of it.
+/// Ridge that only keeps indistinguishable columns from making the equations singular: a parameter with a standard error below a thousandth
+/// of the response's spread moves by less than a thousandth of it.
 const NUMERICAL_RIDGE: f64 = 1e-8;
-/// Steps of Gauss-Newton, and the change of a nonlinear parameter below which it stops.
+/// Largest number of Gauss-Newton steps, and the change of a nonlinear parameter below which they stop.
 const MOST_STEPS: usize = 30;
 const TOLERANCE: f64 = 1e-6;
-/// Times a step is halved.
+/// Number of times a step is halved.
 const HALVINGS: usize = 12;
 
 /// Fits the structure of `law` by least squares without the ridge, time constants within their bounds.
 ///
-/// The ridge is good for the filter and pulls parameters away from where the recording puts them; only the fit without it shows
-/// the recording's information about them, and its certainty.
+/// The ridge helps the filter but biases the parameters. Only the fit without it shows what the recording says about them, and how
+/// certainly.
 pub(crate) fn without_ridge(law: &LawParams, regression: &LawRegression) -> Result<LawStructure, CalibrationError> {
     settle(LawStructure::of_law(law, regression.scale.span, NUMERICAL_RIDGE), regression)
 }
 
-/// The same from a structure.
+/// Fits by least squares, starting from a structure.
 pub(crate) fn settle(
     mut structure: LawStructure,
     regression: &LawRegression,
@@ -45,8 +45,8 @@ pub(crate) fn settle(
     Ok(structure)
 }
 
-/// Gauss-Newton's step of the nonlinear parameters. A time constant that presses against a bound is left out: the step of
-/// the others counts on it to move.
+/// Returns the Gauss-Newton step of the nonlinear parameters. A time constant that would move beyond its bound is left out, because the
+/// step of the others assumes that it moves.
 fn step(
     fit: &mut Linearised,
     structure: &LawStructure,
@@ -66,9 +66,9 @@ fn step(
     }
 }
 
-/// The longest halved step that lowers the squared error.
+/// Returns the result of the longest halved step that lowers the squared error.
 fn descend(structure: &LawStructure, regression: &LawRegression, step: &[f64], error: f64) -> Option<LawStructure> {
-    // A step of more than one in ln τ is beyond what the linearisation knows.
+    // The linearisation does not hold for steps of more than one in ln τ.
     let longest = step.iter().fold(0.0, |longest: f64, x| longest.max(x.abs()));
     let mut share = if longest > 1.0 { 1.0 / longest } else { 1.0 };
     for _ in 0..HALVINGS {
@@ -92,8 +92,8 @@ fn keep_within_bounds(structure: &mut LawStructure, regression: &LawRegression) 
     }
 }
 
-/// Returns the squared error in the unit of the readings. Relative to an R₀ that is fitted as well, a fit could shrink its error by
-/// raising R₀.
+/// Returns the squared error in the unit of the readings. Relative to R₀, which is fitted too, the error could shrink simply because R₀
+/// rises.
 fn squared_error(structure: &LawStructure, regression: &LawRegression) -> Option<f64> {
     let design = structure.design(regression);
     let solution = regression.solve(&design, structure.ridge, None)?;

@@ -1,4 +1,4 @@
-//! Regressions that find the law of the sensor, and what recordings tell of its parameters.
+//! Regressions for the law of the sensor, and the information of recordings on its parameters.
 
 pub(crate) mod advice;
 pub(crate) mod blocked_normal;

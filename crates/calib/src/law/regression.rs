@@ -11,11 +11,11 @@ use crate::order::median;
 use crate::samples::Samples;
 use ohmstrain_sensor::RangeParams;
 
-/// Contiguous blocks of each recording that are left out in turn.
+/// Number of contiguous blocks of each recording that are left out in turn.
 pub(crate) const VALIDATION_BLOCKS: usize = 4;
-/// Rows that a regression uses at most: its residuals are correlated over seconds, and more rows tell nothing new.
+/// Largest number of rows in a regression: residuals are correlated over seconds, so more rows add no information.
 const MOST_ROWS: usize = 6000;
-/// Passes that rescale recordings by their own R₀; each one squares the relative error of the one before.
+/// Number of passes that rescale recordings by their own R₀; each one squares the relative error of the one before.
 const SCALING_PASSES: usize = 3;
 
 /// The recordings as one regression.
@@ -36,7 +36,7 @@ pub(crate) struct RecordingRows {
     reading: Vec<f64>,
 }
 
-/// The regression for given nonlinear parameters: columns and what is subtracted from the reading.
+/// The regression for given nonlinear parameters: columns, and the part that is subtracted from the reading.
 pub(crate) struct Design {
     pub columns: Vec<DVector<f64>>,
     pub free: usize,
@@ -44,7 +44,7 @@ pub(crate) struct Design {
 }
 
 impl Design {
-    /// Response of the design to these weights.
+    /// Returns the response of the design to these weights.
     pub(crate) fn fitted(&self, weights: &DVector<f64>) -> DVector<f64> {
         let weighted = self.columns.iter().zip(weights.iter());
         weighted.fold(self.offset.clone(), |sum, (column, weight)| sum + column * *weight)
@@ -59,14 +59,14 @@ pub(crate) struct Solution {
 }
 
 impl LawRegression {
-    /// Rows of equal weight: see [`robust`](crate::law::robust_loss::robust).
+    /// Makes a regression with rows of equal weight; see [`robust`](crate::law::robust_loss::robust).
     pub(crate) fn new(samples: &[Samples]) -> Result<Self, CalibrationError> {
         let (lower, upper) = check(samples)?;
         let scale = StrainScale { centre: 0.5 * (lower + upper), span: upper - lower };
         Ok(Self::scaled(samples, scale, RangeParams { lower, upper }))
     }
 
-    /// The same on a scale that others have, for laws that hold in a range at least.
+    /// Makes a regression on the strain scale of other sensors, for laws that hold at least in a given range.
     pub(crate) fn on_scale(
         samples: &[Samples],
         scale: StrainScale,
@@ -110,12 +110,12 @@ impl LawRegression {
         }
     }
 
-    /// Square roots of the weights of the complete rows.
+    /// Returns the square roots of the weights of the complete rows.
     pub(crate) fn root_weights(&self) -> DVector<f64> {
         self.column(|recording| recording.root_weights.clone())
     }
 
-    /// Rows of each block in its own recording, from the first complete row on to the next block.
+    /// Returns the rows of each block in its own recording, from the first complete row to the start of the next block.
     pub(crate) fn block_rows(&self) -> Vec<Vec<Range<usize>>> {
         let of_recording = |recording: &RecordingRows| {
             let rows = recording.complete.len();
@@ -127,7 +127,7 @@ impl LawRegression {
         self.recordings.iter().map(of_recording).collect()
     }
 
-    /// One column over the complete rows of all recordings.
+    /// Returns one column over the complete rows of all recordings.
     pub(crate) fn column(&self, mut of: impl FnMut(&RecordingRows) -> DVector<f64>) -> DVector<f64> {
         let mut values = Vec::with_capacity(self.blocks.last().map_or(0, |block| block.end));
         for recording in &self.recordings {
@@ -137,7 +137,7 @@ impl LawRegression {
         DVector::from_vec(values)
     }
 
-    /// Values of the complete rows back in the rows of each recording, NaN elsewhere.
+    /// Distributes values of the complete rows to the rows of each recording, NaN elsewhere.
     pub(crate) fn by_recording(&self, values: &DVector<f64>) -> Vec<Vec<f64>> {
         let mut values = values.iter();
         let spread = |recording: &RecordingRows| {
@@ -157,7 +157,7 @@ impl LawRegression {
         (0..K).map(|j| self.column(|recording| of(recording)[j].clone())).collect()
     }
 
-    /// 1 in the rows of recording `r`, 0 elsewhere: every recording has an R₀ of its own.
+    /// Returns a column that is 1 in the rows of recording `r` and 0 elsewhere: every recording has an R₀ of its own.
     pub(crate) fn own_constant(&self, r: usize) -> DVector<f64> {
         let first = std::ptr::from_ref(&self.recordings[r]);
         self.column(|recording| {
@@ -166,7 +166,7 @@ impl LawRegression {
         })
     }
 
-    /// Readings over the R₀ of their recording.
+    /// Returns the readings over the R₀ of their recording.
     pub(crate) fn response(&self, rest_readings: &[f64]) -> DVector<f64> {
         let mut rests = rest_readings.iter();
         self.column(|recording| {
@@ -175,7 +175,7 @@ impl LawRegression {
         })
     }
 
-    /// Values relative to the R₀ of each recording, back in units of its median reading.
+    /// Converts values relative to the R₀ of each recording to units of its median reading.
     pub(crate) fn in_readings(&self, relative: &DVector<f64>, rest_readings: &[f64]) -> DVector<f64> {
         let mut rests = rest_readings.iter();
         let scale = self.column(|recording| {
@@ -185,7 +185,7 @@ impl LawRegression {
         relative.component_mul(&scale)
     }
 
-    /// Normal equations of a design.
+    /// Returns the normal equations of a design.
     pub(crate) fn normal(&self, design: &Design, rest_readings: &[f64]) -> BlockedNormal {
         let root_weights = self.root_weights();
         let response = (self.response(rest_readings) - &design.offset).component_mul(&root_weights);
@@ -208,12 +208,12 @@ impl LawRegression {
         Some(Solution { weights, rest_readings, cross_validated: normal.cross_validate(&all, ridge)? })
     }
 
-    /// The blocks of the normal equations that a block of every recording is.
+    /// Returns the indices of the normal equations' blocks that together are one block of every recording.
     pub(crate) fn left_out(&self, block: Option<usize>) -> Vec<usize> {
         block.map_or(vec![], |block| (0..self.recordings.len()).map(|r| r * VALIDATION_BLOCKS + block).collect())
     }
 
-    /// Weights by some fit, R₀ of each recording, and the normal equations relative to those.
+    /// Returns the weights by `fit`, R₀ of each recording, and the normal equations relative to these R₀.
     pub(crate) fn with_own_rests(
         &self,
         design: &Design,
@@ -243,8 +243,8 @@ impl RecordingRows {
 
 /// Returns the range of time constants, from the pace of the motion (or three sampling intervals) to a quarter of the longest recording.
 ///
-/// A branch faster than the motion cannot be told from the dash-pot. A law with such a branch explains the recording better,
-/// but its filter takes stretching for releasing.
+/// A branch faster than the motion cannot be distinguished from the dash-pot. A law with such a branch explains the recording better, but
+/// its filter confuses stretching with releasing.
 fn tau_bounds(samples: &[Samples]) -> (f64, f64) {
     let stats = MotionStats::new(samples);
     let intervals = samples

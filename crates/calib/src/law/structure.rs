@@ -20,7 +20,7 @@ impl GaugeFamily {
     /// All families.
     pub const ALL: [Self; 3] = [Self::Polynomial, Self::DecayingExponential, Self::Tunnelling];
 
-    /// Its name on the command line and in files.
+    /// Returns its name on the command line and in files.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -38,15 +38,15 @@ pub struct LawFit {
     pub law: LawParams,
     /// R₀ of each recording.
     pub rest_readings: Vec<f64>,
-    /// Reading over R₀ minus 1 minus the law, row by row of each recording; NaN where the reading is missing.
+    /// Reading over R₀, minus 1 and the law, row by row of each recording; NaN where the reading is missing.
     pub residuals: Vec<Vec<f64>>,
-    /// Root mean squared error on blocks left out, relative to R₀.
+    /// Root mean squared error on held-out blocks, relative to R₀.
     pub cross_validated_error: f64,
-    /// The ridge that cross-validation chose.
+    /// Ridge of the fit.
     pub ridge: f64,
 }
 
-/// Smallest R₀ that is believed, relative to the median reading.
+/// Smallest credible R₀, relative to the median reading.
 const LEAST_REST_SHARE: f64 = 0.05;
 
 /// A structure with its time constants and gauge parameters.
@@ -60,7 +60,7 @@ pub(crate) struct LawStructure {
 }
 
 impl LawStructure {
-    /// The structure of a fitted law.
+    /// Returns the structure of a fitted law.
     pub(crate) fn of_law(law: &LawParams, span: f64, ridge: f64) -> Self {
         let mut nonlinear: Vec<f64> = law.branches.iter().map(|branch| branch.tau_s.ln()).collect();
         let family = match law.gauge {
@@ -77,7 +77,7 @@ impl LawStructure {
         Self { family, taus: law.branches.len(), nonlinear, ridge }
     }
 
-    /// Constant, one more constant per further recording, gauge, dash-pots, branches.
+    /// Builds the design: constant, one more constant per further recording, gauge, dash-pots, branches.
     pub(crate) fn design(&self, regression: &LawRegression) -> Design {
         let mut columns: Vec<DVector<f64>> =
             (0..regression.recordings.len()).map(|r| regression.own_constant(r)).collect();
@@ -105,7 +105,7 @@ impl LawStructure {
         Design { columns, free, offset }
     }
 
-    /// The law without block `left_out` of every recording.
+    /// Fits the law without block `left_out` of every recording.
     pub(crate) fn fit(&self, regression: &LawRegression, left_out: Option<usize>) -> Result<LawFit, CalibrationError> {
         let design = self.design(regression);
         let solution = regression.solve(&design, self.ridge, left_out).ok_or(CalibrationError::Singular)?;
@@ -125,8 +125,7 @@ impl LawStructure {
         })
     }
 
-    /// The weights of a law of this structure in the design of one recording, the constant with them: what [`Self::law`] turns
-    /// into that law.
+    /// Returns the weights of a law of this structure in the design of one recording, constant included; the inverse of [`Self::law`].
     pub(crate) fn weights(&self, law: &LawParams, scale: StrainScale) -> DVector<f64> {
         let StrainScale { centre, span } = scale;
         let mut weights = vec![0.0];
@@ -154,7 +153,7 @@ impl LawStructure {
         self.nonlinear[..self.taus].sort_by(f64::total_cmp);
     }
 
-    /// The weights in the law's own units.
+    /// Converts the weights to a law in its own units.
     pub(crate) fn law(&self, regression: &LawRegression, weights: &[f64]) -> LawParams {
         let StrainScale { centre, span } = regression.scale;
         let mut rest = weights[regression.recordings.len()..].iter().copied();
@@ -187,7 +186,7 @@ impl LawStructure {
     }
 }
 
-/// The tunnelling curve from parameters of order one.
+/// Returns the tunnelling curve, given parameters of order one.
 fn tunnelling(parameters: &[f64], span: f64) -> GaugeParams {
     GaugeParams::Tunnelling {
         gap: (parameters[0].exp() - 1.0) / span,

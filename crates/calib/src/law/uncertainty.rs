@@ -6,9 +6,9 @@ use crate::law::regression::{LawRegression, Solution};
 use crate::law::structure::LawStructure;
 use ohmstrain_sensor::{LawParameter, LawParams, Uncertainty};
 
-/// Contiguous blocks over which residuals may be correlated as they like.
+/// Number of contiguous blocks; residuals may be correlated within a block.
 const JACKKNIFE_BLOCKS: usize = 40;
-/// Step of finite differences in parameters of order one.
+/// Step of finite differences, for parameters of order one.
 const STEP: f64 = 1e-4;
 
 /// A fitted structure with the derivative of its fit.
@@ -43,18 +43,18 @@ impl<'a> Linearised<'a> {
         Ok(Self { structure, regression, solution, free, residual, jacobian })
     }
 
-    /// R₀ of each recording.
+    /// Returns R₀ of each recording.
     pub(crate) fn rest_readings(&self) -> &[f64] {
         &self.solution.rest_readings
     }
 
-    /// JᵀJ, penalised as the fit was.
+    /// Returns JᵀJ, penalised as in the fit.
     pub(crate) fn normal(&self) -> DMatrix<f64> {
         let (rows, size) = self.jacobian.shape();
         let mut normal = self.jacobian.tr_mul(&self.jacobian);
         for j in self.free..size {
             normal[(j, j)] += self.structure.ridge * rows as f64 * self.jacobian.column(j).variance();
-            // A column that does nothing has no uncertainty to speak of.
+            // A column without effect has no meaningful uncertainty.
             if normal[(j, j)] <= 0.0 {
                 normal[(j, j)] = 1.0;
             }
@@ -62,8 +62,8 @@ impl<'a> Linearised<'a> {
         normal
     }
 
-    /// The block sandwich `A⁻¹ (Σ g_b g_bᵀ) A⁻¹`, g_b the gradient summed over a block of rows. Residuals of such laws are neither
-    /// white nor even, for which the usual `σ² A⁻¹` is several times too small.
+    /// Returns the block sandwich `A⁻¹ (Σ g_b g_bᵀ) A⁻¹`, g_b the gradient summed over a block of rows. Residuals of such laws are neither
+    /// white nor of equal variance, which makes the usual `σ² A⁻¹` several times too small.
     ///
     /// Source: Liang & Zeger, *Biometrika* 73 (1986) 13.
     fn sandwich(&self) -> Option<DMatrix<f64>> {
@@ -77,8 +77,8 @@ impl<'a> Linearised<'a> {
         Some(factor.solve(&half.transpose()) * (JACKKNIFE_BLOCKS as f64 / (JACKKNIFE_BLOCKS - 1) as f64))
     }
 
-    /// `(B - 1)/B Σ d_b d_bᵀ`, d_b the change of the fit when block b is left out: the block jackknife. The sandwich takes
-    /// residuals for errors; with a dozen parameters and forty blocks they are too small, and here that is made good.
+    /// Returns the block jackknife `(B - 1)/B Σ d_b d_bᵀ`, d_b the change of the fit when block b is left out. The sandwich takes residuals
+    /// for errors; with a dozen parameters and forty blocks they are too small, which the jackknife corrects.
     ///
     /// Source: Bell & McCaffrey, *Survey Methodology* 28 (2002) 169.
     fn jackknife(&self) -> Option<DMatrix<f64>> {
@@ -91,7 +91,7 @@ impl<'a> Linearised<'a> {
         Some(out * ((JACKKNIFE_BLOCKS - 1) as f64 / JACKKNIFE_BLOCKS as f64))
     }
 
-    /// JᵀJ and Jᵀr of each block.
+    /// Returns JᵀJ and Jᵀr of each block.
     fn blocks(&self) -> impl Iterator<Item = (DMatrix<f64>, DVector<f64>)> {
         let rows = self.jacobian.nrows();
         (0..JACKKNIFE_BLOCKS).map(move |block| {
@@ -101,7 +101,7 @@ impl<'a> Linearised<'a> {
         })
     }
 
-    /// A covariance carried over to the law's own units.
+    /// Converts a covariance to the law's own units.
     fn uncertainty(&self, covariance: &DMatrix<f64>) -> Uncertainty {
         let linear = self.solution.weights.len();
         let mut point: Vec<f64> = self.solution.weights.iter().copied().collect();
@@ -115,20 +115,20 @@ impl<'a> Linearised<'a> {
         carry_over(covariance, &point, physical)
     }
 
-    /// Parameters with standard errors by the block jackknife, or by the sandwich where a block cannot be spared.
+    /// Returns the parameters with standard errors by the block jackknife, or by the sandwich if a fit without some block is singular.
     pub(crate) fn jackknifed(&self) -> Result<Uncertainty, CalibrationError> {
         let covariance = self.jackknife().or_else(|| self.sandwich()).ok_or(CalibrationError::Singular)?;
         Ok(self.uncertainty(&covariance))
     }
 
-    /// The parameters by name, in the law's own units.
+    /// Returns the parameters by name, in the law's own units.
     pub(crate) fn named(&self) -> Vec<(String, f64)> {
         let law = self.structure.law(self.regression, self.solution.weights.as_slice());
         in_own_units(law, self.solution.weights[0] * self.solution.rest_readings[0], self.solution.weights[0])
     }
 }
 
-/// Covariance of `physical(point)` from the covariance of `point`, to first order.
+/// Returns the covariance of `physical(point)`, given that of `point`, to first order.
 fn carry_over(
     covariance: &DMatrix<f64>,
     point: &[f64],
@@ -156,7 +156,7 @@ fn carry_over(
     }
 }
 
-/// The law's parameters by name; everything is relative to R₀, which is `share` of what the law was fitted with.
+/// Returns the law's parameters by name, relative to R₀, which is `share` of the R₀ in the fit.
 fn in_own_units(mut law: LawParams, rest_reading: f64, share: f64) -> Vec<(String, f64)> {
     let of_law = law.parameters_mut().into_iter().map(|LawParameter { name, value, is_over_rest }| {
         let value = *value;

@@ -16,8 +16,9 @@ pub struct Derivatives {
     pub hessian: DMatrix<f64>,
 }
 
-/// One filter run per pair of parameters, in numbers that carry both derivatives and the mixed one. Nothing is
-/// approximated: only the filter's own branches (a maximum, a comparison) are differentiated on the side they took.
+/// Computes the derivatives with one filter run per pair of parameters, in numbers that carry both derivatives and the
+/// mixed one. Nothing is approximated; at the filter's own branches (a maximum, a comparison) the derivative is that of
+/// the side taken.
 ///
 /// Source: Fike & Alonso, AIAA 2011-886.
 pub(super) fn derivatives<F: ModelFamily<N, L>, const N: usize, const L: usize>(
@@ -47,7 +48,7 @@ pub(super) fn derivatives<F: ModelFamily<N, L>, const N: usize, const L: usize>(
     }
 }
 
-/// Value and gradient alone: one filter run per two parameters.
+/// Returns value and gradient only: one filter run per two parameters.
 pub(super) fn gradient<F: ModelFamily<N, L>, const N: usize, const L: usize>(
     family: &F,
     ln_parameters: &[f64],
@@ -66,8 +67,8 @@ pub(super) fn gradient<F: ModelFamily<N, L>, const N: usize, const L: usize>(
     Ok((log_likelihood, slopes))
 }
 
-/// The log-likelihood in numbers that carry the derivatives with respect to two of the logarithms, and the mixed one. A
-/// seed beyond the parameters derives with respect to nothing.
+/// Returns the log-likelihood in numbers that carry the derivatives with respect to two of the logarithms, and the
+/// mixed one. An index beyond the parameters has no derivative.
 fn seeded<F: ModelFamily<N, L>, const N: usize, const L: usize>(
     family: &F,
     ln_parameters: &[f64],

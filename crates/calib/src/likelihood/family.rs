@@ -6,17 +6,17 @@ pub trait ModelFamily<const N: usize, const L: usize> {
     /// A model with numbers of type `T`.
     type Model<T: Scalar>: Dynamics<T, N, L> + Channel<T, N, L>;
 
-    /// The model with these parameters, on their natural scale.
+    /// Returns the model with these parameters, on their natural scale.
     ///
     /// # Errors
-    /// Names the parameter that no model can have.
+    /// Names the parameter whose value no model can have.
     fn model<T: Scalar>(&self, parameters: &[T]) -> Result<Self::Model<T>, ParameterError>;
 
-    /// Belief before the first reading, which is an update without a prediction.
+    /// Returns the belief before the first reading. That reading is an update without a prediction.
     fn start<T: Scalar>(&self, model: &Self::Model<T>) -> Belief<T, N, L>;
 }
 
-/// A parameter to be found.
+/// A parameter of the search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameter {
     /// Its name.
@@ -30,7 +30,7 @@ pub struct Parameter {
 }
 
 impl Parameter {
-    /// A parameter that may be a million times smaller or larger than where the search starts.
+    /// Returns a parameter that may be a million times smaller or larger than its start.
     #[must_use]
     pub const fn around(name: &'static str, start: f64) -> Self {
         Self { name, start, lower: start * 1e-6, upper: start * 1e6 }

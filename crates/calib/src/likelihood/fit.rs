@@ -27,7 +27,7 @@ pub enum Bound {
 }
 
 impl Bound {
-    /// `lower` or `upper`.
+    /// Returns `lower` or `upper`.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -44,12 +44,13 @@ pub struct FittedParameter {
     pub name: &'static str,
     /// Its value.
     pub value: f64,
-    /// Standard error of its logarithm, from the Hessian; `None` on a bound and where the likelihood is no maximum.
+    /// Standard error of its logarithm, from the Hessian; `None` on a bound, or if the point is not a maximum of the
+    /// likelihood.
     pub ln_standard_error: Option<f64>,
     /// Standard error on its natural scale. At the maximum the gradient is zero, so the Hessian on that scale gives the
-    /// same.
+    /// same value.
     pub standard_error: Option<f64>,
-    /// The bound on which it ended. The likelihood would go on rising beyond.
+    /// Bound on which it ended; the likelihood still rises beyond.
     pub bound: Option<Bound>,
 }
 
@@ -62,42 +63,42 @@ pub struct LikelihoodFit {
     pub log_likelihood: ReadingsLikelihood<f64>,
     /// Euclidean norm of the gradient with respect to the logarithms of the parameters that are not on a bound.
     pub gradient_norm: f64,
-    /// Covariance of the logarithms of the parameters, zero in rows and columns of those on a bound; `None` where the
-    /// likelihood is no maximum.
+    /// Covariance of the logarithms of the parameters, zero in rows and columns of those on a bound; `None` if the
+    /// point is not a maximum of the likelihood.
     pub ln_covariance: Option<DMatrix<f64>>,
-    /// Steps tried.
+    /// Number of steps tried.
     pub iterations: usize,
     /// True if the last step was shorter than 1e-8 standard errors, at a maximum.
     pub converged: bool,
 }
 
 impl<F: ModelFamily<N, L>, const N: usize, const L: usize> Likelihood<'_, F, N, L> {
-    /// The log-likelihood at `values`, on the parameters' natural scale.
+    /// Returns the log-likelihood at `values`, on the parameters' natural scale.
     ///
     /// # Errors
-    /// A parameter that no model can have, or the time at which the filter fails.
+    /// If no model can have one of the parameters, or with the time at which the filter fails.
     pub fn log_likelihood(&self, values: &[f64]) -> Result<ReadingsLikelihood<f64>, CalibrationError> {
         log_likelihood(self.family, values, self.recordings)
     }
 
-    /// The same with exact derivatives with respect to the logarithms.
+    /// Returns the log-likelihood with exact derivatives with respect to the logarithms of `values`.
     ///
     /// # Errors
-    /// As [`Self::log_likelihood`], or a value that is not positive, or a derivative that does not exist.
+    /// As [`Self::log_likelihood`], or if a value is not positive or a derivative does not exist.
     pub fn derivatives(&self, values: &[f64]) -> Result<Derivatives, CalibrationError> {
         let ln: Vec<f64> = values.iter().map(|value| value.ln()).collect();
         derivatives(self.family, &ln, self.recordings)
     }
 
-    /// The parameters that make the readings most likely.
+    /// Finds the parameters that maximise the likelihood of the readings.
     ///
     /// # Errors
-    /// A start that is not within positive bounds, or at which the filter fails.
+    /// If a start is not within positive bounds, or if the filter fails there.
     pub fn fit(&self) -> Result<LikelihoodFit, CalibrationError> {
         self.fit_within(MOST_ITERATIONS)
     }
 
-    /// [`Self::fit`] with a limit of its own to the steps.
+    /// Runs [`Self::fit`] with another limit on the number of steps.
     pub(super) fn fit_within(&self, most_iterations: usize) -> Result<LikelihoodFit, CalibrationError> {
         for Parameter { name, start, lower, upper } in self.parameters {
             if !(0.0 < *lower && lower <= start && start <= upper && upper.is_finite()) {

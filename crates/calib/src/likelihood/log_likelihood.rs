@@ -6,20 +6,19 @@ use ohmstrain_model::Scalar;
 use super::ModelFamily;
 use crate::CalibrationError;
 
-/// Readings without a reference. The shorter of times and readings counts.
+/// Readings without a reference. If times and readings differ in number, the surplus is ignored.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ReadingSeries<'a> {
     /// Times, s, not decreasing.
     pub time_s: &'a [f64],
     /// Readings in the channel's unit; NaN where missing.
     pub value: &'a [f64],
-    /// Standard deviation that the electronics add to each reading; NaN, or past the slice's end, where nothing is known
-    /// of it.
+    /// Standard deviation that the electronics add to each reading; NaN, or beyond the slice's end, if it is unknown.
     pub extra_sd: &'a [f64],
 }
 
 impl ReadingSeries<'_> {
-    /// The reading of a row; `None` where it is missing.
+    /// Returns the reading of a row; `None` if it is missing.
     fn reading<T: Scalar>(&self, row: usize) -> Option<Reading<T>> {
         let value = self.value.get(row).filter(|value| !value.is_nan())?;
         let extra_sd = self.extra_sd.get(row).filter(|sd| !sd.is_nan()).copied().unwrap_or(0.0);
@@ -32,7 +31,7 @@ impl ReadingSeries<'_> {
 pub struct ReadingsLikelihood<T> {
     /// Log-likelihood with all constants.
     pub value: T,
-    /// Readings that were not missing.
+    /// Number of readings that were not missing.
     pub readings: usize,
 }
 
@@ -67,15 +66,16 @@ where
     Ok(run.sum)
 }
 
-/// A filter on its way through recordings.
+/// A filter running through recordings.
 struct Run<M, P, T> {
     filter: Ekf<M>,
-    /// Prepared steps by their length in nanoseconds: differences of decimal times repeat to rounding only.
+    /// Prepared steps by their length in nanoseconds, because differences of decimal times are equal only up to
+    /// rounding.
     prepared: HashMap<u64, P>,
     sum: ReadingsLikelihood<T>,
 }
 
-/// A recording whose steps never repeat must not fill the memory.
+/// Largest number of prepared steps, which bounds the memory for a recording whose steps never repeat.
 const MOST_PREPARED: usize = 4096;
 
 impl<M, T: Scalar, P: Copy> Run<M, P, T> {

@@ -5,9 +5,9 @@ use crate::CalibrationError;
 
 /// Objective to be maximised, as a function of the logarithms of the parameters.
 pub(super) trait Objective {
-    /// The value; not finite counts as impossible.
+    /// Returns the value; a value that is not finite counts as impossible.
     fn value(&self, at: &[f64]) -> f64;
-    /// Value, gradient and Hessian.
+    /// Returns value, gradient and Hessian.
     fn derivatives(&self, at: &[f64]) -> Result<Derivatives, CalibrationError>;
 }
 
@@ -15,29 +15,30 @@ pub(super) trait Objective {
 pub(super) struct Optimum {
     pub point: Vec<f64>,
     pub derivatives: Derivatives,
-    /// Parameters that were free at the end: not pressed against a bound.
+    /// Parameters that were free at the end: not held at a bound.
     pub free: Vec<usize>,
     pub iterations: usize,
     pub converged: bool,
 }
 
-/// Iterations allowed; a dozen is usual.
+/// Largest number of iterations; a dozen is usual.
 pub(super) const MOST_ITERATIONS: usize = 200;
 /// First and largest length of a step, in the logarithm of a parameter.
 const FIRST_RADIUS: f64 = 1.0;
 const LARGEST_RADIUS: f64 = 4.0;
-/// A step shorter than this many standard errors is the last one.
+/// Length of a step, in standard errors, below which it is the last one.
 const TOLERANCE: f64 = 1e-8;
-/// A gain below this share of the value is lost in the rounding of the value; the step is taken without asking.
+/// Gain, as a fraction of the value, below which it is lost in the value's rounding; such a step is taken without a
+/// check.
 const ROUNDING: f64 = 1e-11;
-/// Curvatures below this share of the largest one count as that share.
+/// Smallest curvature, as a fraction of the largest; smaller ones are raised to it.
 const FLATTEST: f64 = 1e-10;
 
-/// Newton's method between bounds, with the exact Hessian.
+/// Maximises by Newton's method within bounds, with the exact Hessian.
 ///
-/// Negative curvatures are turned around, steps are cut to a radius that grows and shrinks with success, and parameters
-/// that press against a bound are left out of the step. The last steps are Newton's own, taken on the gradient alone.
-/// Written out because the trust region and Newton solvers of argmin know neither bounds nor an end.
+/// Negative curvatures change sign, steps are limited to a radius that grows and shrinks with success, and parameters
+/// held at a bound are left out of the step. The last steps are pure Newton steps that rely on the gradient alone.
+/// argmin's trust-region and Newton solvers support neither bounds nor a stopping rule, hence this implementation.
 ///
 /// Source: Bertsekas, *SIAM J. Control Optim.* 20 (1982) 221 for the bounds.
 pub(super) fn maximise(
@@ -78,7 +79,7 @@ pub(super) fn maximise(
     }
 }
 
-/// Parameters that a step may move: those that do not press against a bound.
+/// Returns the parameters that a step may move: those not held at a bound.
 fn free(point: &[f64], gradient: &DVector<f64>, bounds: &[(f64, f64)]) -> Vec<usize> {
     let moves = |i: &usize| {
         let (lower, upper) = bounds[*i];
@@ -88,12 +89,12 @@ fn free(point: &[f64], gradient: &DVector<f64>, bounds: &[(f64, f64)]) -> Vec<us
     (0..point.len()).filter(moves).collect()
 }
 
-/// A Newton step with every curvature made a maximum's.
+/// A Newton step with every curvature made negative, as at a maximum.
 struct NewtonStep {
     direction: DVector<f64>,
     /// gᵀ |H|⁻¹ g: twice the gain expected, and the squared length of the step in standard errors.
     decrement: f64,
-    /// True if all curvatures were those of a maximum.
+    /// True if all curvatures were already those of a maximum.
     concave: bool,
 }
 
@@ -119,12 +120,12 @@ impl NewtonStep {
     }
 }
 
-/// Rows and columns of a symmetric matrix.
+/// Returns the kept rows and columns of a symmetric matrix.
 pub(super) fn sub_matrix(matrix: &DMatrix<f64>, kept: &[usize]) -> DMatrix<f64> {
     DMatrix::from_fn(kept.len(), kept.len(), |a, b| matrix[(kept[a], kept[b])])
 }
 
-/// Inverse of the negative Hessian among the free parameters; `None` unless it is a maximum's.
+/// Returns the inverse of the negative Hessian among the free parameters; `None` unless the point is a maximum.
 pub(super) fn covariance(optimum: &Optimum) -> Option<DMatrix<f64>> {
     Some(Cholesky::new(-sub_matrix(&optimum.derivatives.hessian, &optimum.free))?.inverse())
 }

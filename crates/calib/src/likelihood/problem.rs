@@ -8,23 +8,23 @@ use crate::CalibrationError;
 use crate::optimise::nelder_mead;
 use ohmstrain_sensor::LawParams;
 
-/// The likelihood of readings `R/R₀ - 1` under the extended Kalman filter of a known law, as a function of the parameters
-/// in `free`, each from a thousandth to a thousand times where it starts.
+/// The likelihood of readings `R/R₀ - 1` under the extended Kalman filter of a known law, as a function of the parameters in `free`, each
+/// within a factor of a thousand of its start.
 ///
-/// The strain is not needed. In exchange the law is trusted: its error goes into whatever noise fits it best.
+/// The strain is not needed. In exchange the law is assumed to be exact: its error is attributed to the noise that fits it best.
 #[derive(Clone, Copy, Debug)]
 pub struct LikelihoodProblem<'a> {
     /// Recordings; the filter restarts for each.
     pub recordings: &'a [ReadingSeries<'a>],
     /// The law; at most four branches.
     pub law: &'a LawParams,
-    /// Noise and motion to start from.
+    /// Initial noise and motion.
     pub start: &'a NoiseStart,
-    /// The parameters that are looked for; none of them starts at zero.
+    /// Free parameters; none of them starts at zero.
     pub free: &'a [NoiseParameter],
 }
 
-/// Makes the likelihood of the size of a problem's law, and evaluates an expression on it.
+/// Builds the likelihood in the size of a problem's law, and evaluates an expression on it.
 macro_rules! asked {
     ($problem:expr, $likelihood:ident => $answer:expr) => {{
         let (parameters, branches) = ($problem.parameters(), $problem.law.branches.len());
@@ -38,7 +38,7 @@ macro_rules! asked {
 }
 
 impl LikelihoodProblem<'_> {
-    /// The log-likelihood where the search starts.
+    /// Returns the log-likelihood at the start.
     ///
     /// # Errors
     /// As [`Self::fit`].
@@ -47,7 +47,7 @@ impl LikelihoodProblem<'_> {
         asked!(self, likelihood => likelihood.log_likelihood(&start))
     }
 
-    /// The noise and motion that make the readings most likely.
+    /// Finds the noise and motion that maximise the likelihood of the readings.
     ///
     /// # Errors
     /// If nothing is free, a free parameter starts at zero, the law is not supported, or the filter fails.
@@ -60,7 +60,7 @@ impl LikelihoodProblem<'_> {
         Ok(NoiseFit { noise, motion, warnings: warnings(&fit), fit })
     }
 
-    /// [`Likelihood::profile_interval`] of parameter `index` in `free` around the maximum.
+    /// Returns [`Likelihood::profile_interval`] of parameter `index` in `free` around the maximum.
     ///
     /// # Errors
     /// If the law is not supported.
@@ -68,7 +68,7 @@ impl LikelihoodProblem<'_> {
         asked!(self, likelihood => Ok(likelihood.profile_interval(fit, index)))
     }
 
-    /// The parameters that are looked for, and where.
+    /// Returns the free parameters with their starts and bounds.
     fn parameters(&self) -> Vec<Parameter> {
         let parameter = |free: &NoiseParameter| {
             let value = free.get(&self.start.noise, &self.start.motion);
@@ -83,13 +83,13 @@ impl LikelihoodProblem<'_> {
     }
 }
 
-/// Searches across jumps at most, and Newton's steps in each; a dozen or two are usual where nothing jumps.
+/// Largest number of searches across jumps, and of Newton steps in each; a dozen or two are usual without jumps.
 const MOST_ROUNDS: usize = 3;
 const MOST_STEPS: usize = 40;
-/// Side of the simplex, in the logarithms, and its steps: a hundred cost what a few of Newton's do.
+/// Side of the simplex, in the logarithms, and its number of steps; a hundred cost as much as a few Newton steps.
 const SIMPLEX: (f64, u64) = (0.3, 200);
 
-/// The parameters, starting from the best point that a simplex finds around `from`.
+/// Returns the parameters, starting from the best point that a simplex finds around `from`.
 fn across_jumps<F: ModelFamily<N, L>, const N: usize, const L: usize>(
     likelihood: &Likelihood<F, N, L>,
     from: &LikelihoodFit,
@@ -104,8 +104,8 @@ fn across_jumps<F: ModelFamily<N, L>, const N: usize, const L: usize>(
     Ok(likelihood.parameters.iter().zip(values).map(|(parameter, start)| Parameter { start, ..*parameter }).collect())
 }
 
-/// The likelihood jumps where the mean of a filter moves across a border of the law's range, at which the slope of the
-/// gains ends: Newton's method may stop at the edge. A simplex goes on from there, and Newton's method from where that ends.
+/// Maximises a likelihood that may jump. A jump occurs where the mean of a filter crosses a limit of the law's range, at which the slope of
+/// the gains ends; Newton's method may stop at its edge. A simplex continues from there, and Newton's method from the end of the simplex.
 fn maximum<F: ModelFamily<N, L>, const N: usize, const L: usize>(
     likelihood: &Likelihood<F, N, L>,
 ) -> Result<LikelihoodFit, CalibrationError> {

@@ -4,32 +4,32 @@ use super::derivatives::{derivatives, gradient};
 use super::newton::sub_matrix;
 use super::{Likelihood, LikelihoodFit, ModelFamily};
 
-/// Half the 95 % quantile of χ² with one degree of freedom: how far the profile may fall.
+/// Half the 95 % quantile of χ² with one degree of freedom: the fall of the profile at an end of the interval.
 const FALL: f64 = 1.920_729_410_347_062;
-/// Steps allowed to each end; five to ten are usual.
+/// Largest number of steps to each end; five to ten are usual.
 const MOST_STEPS: usize = 30;
-/// A step shorter than this, in the logarithms, is the last one.
+/// Length of a step, in the logarithms, below which it is the last one.
 const TOLERANCE: f64 = 1e-6;
 /// Longest step, in the logarithm of a parameter.
 const LONGEST: f64 = 2.0;
-/// Least cosine between the unexplained change of gradient and the step for a rank-one update of the Hessian: a smaller one
-/// is rounding.
+/// Least cosine between the unexplained change of the gradient and the step for a rank-one update of the Hessian; a smaller one is
+/// rounding.
 const TEACHES: f64 = 1e-8;
 
-/// A 95 % interval from the profile likelihood: the values for which the other parameters can make the readings likely
-/// enough. It follows the likelihood where that is no parabola, and does not pass through zero.
+/// A 95 % interval from the profile likelihood: the values at which the other parameters can make the readings sufficiently likely. It
+/// follows the likelihood where that is not a parabola, and does not include zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProfileInterval {
-    /// Lower end; `None` where it is not found.
+    /// Lower end; `None` if it is not found.
     pub lower: Option<f64>,
-    /// Upper end, likewise.
+    /// Upper end; `None` if it is not found.
     pub upper: Option<f64>,
 }
 
 impl<F: ModelFamily<N, L>, const N: usize, const L: usize> Likelihood<'_, F, N, L> {
-    /// The profile interval of parameter `index` around the maximum `fit`: Newton's method on the end itself, with
-    /// gradients only and the Hessian kept up to date from them. An end is `None` if it lies beyond a bound of any
-    /// parameter, if the method does not reach it, or if the parameter is not free; both are where `fit` is no maximum.
+    /// Returns the profile interval of parameter `index` around the maximum `fit`. Newton's method searches for each end itself, with
+    /// gradients only, from which the Hessian is kept up to date. An end is `None` if it is beyond a bound of any parameter, if the method
+    /// does not reach it, or if the parameter is not free. Both ends are `None` if `fit` is not a maximum.
     ///
     /// Source: Venzon & Moolgavkar, *Appl. Statist.* 37 (1988) 87; the symmetric rank-one update of Nocedal & Wright,
     /// *Numerical Optimization* (2006), section 6.2.
@@ -40,20 +40,20 @@ impl<F: ModelFamily<N, L>, const N: usize, const L: usize> Likelihood<'_, F, N, 
     }
 }
 
-/// Walk from the maximum to an end of the interval, where the likelihood has fallen to its target and the gradient of the other
-/// parameters is zero. In logarithms.
+/// Search from the maximum to an end of the interval, where the likelihood has fallen to its target and the gradient of the other
+/// parameters is zero. All parameters are logarithms.
 struct Walk<'a, F, const N: usize, const L: usize> {
     likelihood: &'a Likelihood<'a, F, N, L>,
-    /// Parameters that move, and which of them the interval is about.
+    /// Parameters that move, and the index among them of the one that the interval is about.
     free: Vec<usize>,
     about: usize,
-    /// -1 to the lower end, 1 to the upper one.
+    /// -1 toward the lower end, 1 toward the upper one.
     sign: f64,
     target: f64,
     point: Vec<f64>,
     value: f64,
     gradient: DVector<f64>,
-    /// Among the free parameters.
+    /// Hessian of the free parameters.
     hessian: DMatrix<f64>,
 }
 
@@ -101,10 +101,10 @@ impl<'a, F: ModelFamily<N, L>, const N: usize, const L: usize> Walk<'a, F, N, L>
             }
             let (value, all) = gradient(self.likelihood.family, &next, self.likelihood.recordings).ok()?;
             let slopes = DVector::from_iterator(self.free.len(), self.free.iter().map(|&i| all[i]));
-            // Far below the target the likelihood is no parabola any more.
+            // Far below the target the likelihood is no longer a parabola.
             if value < self.target - FALL || !(value + slopes.sum()).is_finite() {
                 longest = 0.5 * step.amax();
-                // It does not fall, it jumps.
+                // The likelihood jumps instead of falling.
                 if longest < TOLERANCE {
                     return None;
                 }
@@ -117,13 +117,13 @@ impl<'a, F: ModelFamily<N, L>, const N: usize, const L: usize> Walk<'a, F, N, L>
         None
     }
 
-    /// The step to where the quadratic through here, made as large as the others can make it, has fallen to the target.
+    /// Returns the step to the point where the local quadratic, maximised over the other parameters, has fallen to the target.
     fn step(&self) -> Option<DVector<f64>> {
         let others: Vec<usize> = (0..self.free.len()).filter(|&k| k != self.about).collect();
         let among_others = Cholesky::new(-sub_matrix(&self.hessian, &others))?;
         let with = DVector::from_iterator(others.len(), others.iter().map(|&k| self.hessian[(k, self.about)]));
         let slopes = DVector::from_iterator(others.len(), others.iter().map(|&k| self.gradient[k]));
-        // The others' best step is `offset + along · s` for a step s of the parameter itself.
+        // The optimal step of the others is `offset + along · s` for a step s of the parameter itself.
         let (offset, along) = (among_others.solve(&slopes), among_others.solve(&with));
         let above = self.value - self.target + 0.5 * slopes.dot(&offset);
         let slope = self.gradient[self.about] + with.dot(&offset);
@@ -132,7 +132,7 @@ impl<'a, F: ModelFamily<N, L>, const N: usize, const L: usize> Walk<'a, F, N, L>
         if !(discriminant > 0.0) {
             return None;
         }
-        // The root on the falling side, in the form that subtracts no equal numbers.
+        // The root on the falling side, in the form without cancellation.
         let own = self.sign * 2.0 * above / (discriminant.sqrt() - self.sign * slope);
         let mut step = DVector::zeros(self.free.len());
         step[self.about] = own;
@@ -142,7 +142,7 @@ impl<'a, F: ModelFamily<N, L>, const N: usize, const L: usize> Walk<'a, F, N, L>
         step.iter().all(|by| by.is_finite()).then_some(step)
     }
 
-    /// Brings the Hessian up to date with what the gradient has become after a step.
+    /// Updates the Hessian from the change of the gradient over a step.
     fn learn(&mut self, step: &DVector<f64>, slopes: &DVector<f64>) {
         let unexplained = slopes - &self.gradient - &self.hessian * step;
         let along = unexplained.dot(step);
@@ -151,7 +151,7 @@ impl<'a, F: ModelFamily<N, L>, const N: usize, const L: usize> Walk<'a, F, N, L>
         }
     }
 
-    /// Computes the Hessian again where the updates have led astray.
+    /// Computes the Hessian anew if the updates have made it unusable.
     fn exact_hessian(&mut self) -> Option<()> {
         let here = derivatives(self.likelihood.family, &self.point, self.likelihood.recordings).ok()?;
         self.hessian = sub_matrix(&here.hessian, &self.free);

@@ -2,7 +2,7 @@ use super::{LikelihoodFit, NoiseParameter};
 use crate::samples::usual_step_s;
 use ohmstrain_sensor::{EstimatorParams, MotionParams, NoiseParams};
 
-/// Noise and motion to start from; what is not moved stays as it is here.
+/// Initial noise and motion; parameters that are not free keep these values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NoiseStart {
     /// Noise.
@@ -12,8 +12,8 @@ pub struct NoiseStart {
 }
 
 impl NoiseStart {
-    /// Takes the start from an estimator. The likelihood takes errors of readings for white: it starts with their size at the
-    /// usual step of the rows.
+    /// Takes the start from an estimator. The likelihood assumes white errors of readings; it starts with their standard deviation at the
+    /// usual time step of the rows.
     #[must_use]
     pub fn new(estimator: &EstimatorParams, time_s: &[f64]) -> Self {
         let step_s = usual_step_s([time_s].into_iter());
@@ -35,8 +35,8 @@ pub struct NoiseFit {
     pub warnings: Vec<String>,
 }
 
-/// Largest standard error of a logarithm before a warning: with it the readings carry next to no information on the parameter, a
-/// 95 % interval from a fiftieth to fifty times the value.
+/// Largest standard error of a logarithm without a warning. Beyond it the readings carry next to no information on the parameter: its 95 %
+/// interval is from a fiftieth to fifty times the value.
 const LEAST_SURE: f64 = 2.0;
 
 pub(super) fn found(start: &NoiseStart, free: &[NoiseParameter], fit: &LikelihoodFit) -> (NoiseParams, MotionParams) {

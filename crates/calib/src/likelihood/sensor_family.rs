@@ -6,14 +6,14 @@ use ohmstrain_model::{
 use super::ModelFamily;
 use ohmstrain_sensor::{MotionParams, NoiseParams};
 
-/// A parameter of noise or motion that readings alone may tell something about.
+/// A parameter of noise or motion that readings alone may determine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NoiseParameter {
     /// White noise of a reading, relative to R₀.
     ReadingSd,
-    /// Wander of each branch, relative to R₀.
+    /// Long-run standard deviation of each branch, relative to R₀.
     BranchSd,
-    /// Wander of the baseline, relative to R₀.
+    /// Long-run standard deviation of the baseline, relative to R₀.
     BaselineSd,
     /// Correlation time of the baseline, s.
     BaselineTime,
@@ -28,7 +28,7 @@ impl NoiseParameter {
     pub const ALL: [Self; 6] =
         [Self::ReadingSd, Self::BranchSd, Self::BaselineSd, Self::BaselineTime, Self::RateSd, Self::RateTime];
 
-    /// Its name in reports.
+    /// Returns its name in reports.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -41,7 +41,7 @@ impl NoiseParameter {
         }
     }
 
-    /// Its value in a pair of noise and motion.
+    /// Returns its value in a pair of noise and motion.
     #[must_use]
     pub fn get(self, noise: &NoiseParams, motion: &MotionParams) -> f64 {
         match self {
@@ -55,7 +55,7 @@ impl NoiseParameter {
     }
 }
 
-/// Noise and motion around a known law, N = B + 3; `free` are the parameters that the likelihood moves.
+/// Noise and motion around a known law, N = B + 3; `free` are the parameters that the likelihood varies.
 pub(super) struct SensorFamily<'a, const B: usize> {
     pub law: SensorLaw<f64, B>,
     pub noise: NoiseParams,
@@ -95,7 +95,8 @@ impl<const B: usize> SensorFamily<'_, B> {
         }
     }
 
-    /// Mean and standard deviation of strain, which the readings' scale is judged by, stay.
+    /// Returns the motion. Mean and standard deviation of strain are fixed: they set the scale against which readings
+    /// are judged.
     fn motion<T: Scalar>(&self, values: &[T]) -> Result<Motion<T>, ParameterError> {
         let (rate_sd, rate_time_s) =
             (self.value(NoiseParameter::RateSd, values), self.value(NoiseParameter::RateTime, values));

@@ -1,21 +1,21 @@
-//! Holds around marks, from how still the readings are.
+//! Holds around marks, detected from the speed of the readings.
 
 use crate::order::{extent, sorted};
 use crate::samples::{Samples, central_rate};
 
-/// Time to each side over which readings and their rates are averaged, s.
+/// Half-width of the window over which readings and their rates are averaged, s.
 const AVERAGED_S: f64 = 0.15;
-/// Readings are still below this fraction of their 90 % speed.
+/// Speed below which readings count as still, as a fraction of their 90 % quantile.
 const STILL: f64 = 0.12;
-/// A hold lasts this fraction of the time between the marks before and after it at least, and four standard deviations of a mark's time.
+/// Minimum duration of a hold, as a fraction of the time between the neighbouring marks, and in standard deviations of a mark's time.
 const LEAST_OF_GAP: f64 = 0.25;
 const LEAST_SDS: f64 = 4.0;
-/// Largest change of a hold's second half, as a fraction of the first half's, or of all of it, as a fraction of the readings' range: a
-/// held sensor relaxes. Readings that go on as they began are a slow move.
+/// Largest change over a hold's second half, as a fraction of that over the first half, or over the whole hold, as a fraction of the
+/// readings' range. A held sensor relaxes, so its readings slow down; readings that do not are a slow move.
 const RELAXES: f64 = 0.6;
 const RESTS: f64 = 0.08;
 
-/// Readings that are known, averaged, with their speeds.
+/// Averaged readings, without the missing ones, and their speeds.
 pub(crate) struct Stillness {
     time_s: Vec<f64>,
     reading: Vec<f64>,
@@ -36,8 +36,8 @@ impl Stillness {
         Self { time_s, reading, speed, still, range: high - low }
     }
 
-    /// Beginning and end of the hold around `time_s`, which lies between the marks at `before_s` and `after_s`; `None` if the readings
-    /// move. `time_sd_s` is the standard deviation of the mark's time.
+    /// Returns the start and end, s, of the hold around `time_s`, which lies between the marks at `before_s` and `after_s`; `None` if the
+    /// readings move. `time_sd_s` is the standard deviation of the mark's time.
     pub(crate) fn hold(&self, time_s: f64, (before_s, after_s): (f64, f64), time_sd_s: f64) -> Option<(f64, f64)> {
         let row = |time_s: f64| self.time_s.partition_point(|t| *t < time_s);
         let near = row(time_s - 2.0 * time_sd_s)..row(time_s + 2.0 * time_sd_s);
@@ -58,7 +58,7 @@ impl Stillness {
     }
 }
 
-/// Mean over [`AVERAGED_S`] to each side.
+/// Returns the mean over [`AVERAGED_S`] to each side.
 fn averaged(time_s: &[f64], values: &[f64]) -> Vec<f64> {
     let row = |t: f64| time_s.partition_point(|s| *s < t);
     let mean = |t: &f64| {

@@ -1,4 +1,4 @@
-//! Motion and law at once: the most probable motion under the readings, with its covariance.
+//! Joint fit of motion and law: the most probable motion given the readings, with its covariance.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -12,48 +12,48 @@ use crate::order::median;
 use crate::samples::Samples;
 use ohmstrain_sensor::RangeParams;
 
-/// Rows that the fit uses at most.
+/// Largest number of rows in the fit.
 const MOST_ROWS: usize = 1000;
-/// A law's errors last as long as a move and come again with the next one like it: the rows of a move count as this many independent
-/// readings. With 1 to 4 of them the stated deviations held on four recordings of six, with 16 on none.
+/// Number of independent readings to which the rows of a move amount: a law's errors last as long as a move and recur in similar moves.
+/// With 1 to 4 the stated deviations held on four recordings of six, with 16 on none.
 const READINGS_OF_MOVE: f64 = 2.0;
-/// A move whose mean squared misfit is above this multiple of the median move's is irregular.
+/// Multiple of the median move's mean squared misfit above which a move is irregular.
 const IRREGULAR: f64 = 4.0;
-/// Ridge of the law: no move has a regressor to itself.
+/// Ridge of the law, which keeps any regressor from serving a single move.
 const RIDGE: f64 = 0.01;
-/// Steps of Gauss-Newton, and after how many of them time constants are fitted again.
+/// Largest number of Gauss-Newton steps, and number of steps after which time constants are fitted again.
 const STEPS: usize = 8;
 const TAUS_EVERY: usize = 4;
-/// Longest step of a parameter, in standard deviations of its prior, and the smallest fraction of a step that is tried.
+/// Longest step of a parameter, in standard deviations of its prior, and smallest fraction of a step that is tried.
 const LONGEST: f64 = 1.5;
 const LEAST_FRACTION: f64 = 0.02;
-/// Decrease of the cost that is none.
+/// Decrease of the cost below which the descent ends.
 const TOLERANCE: f64 = 0.05;
-/// Difference for derivatives, in the same unit.
+/// Step of finite differences, in standard deviations of the prior.
 const DIFFERENCE: f64 = 1e-3;
 
-/// A motion that was fitted, with the covariance of its parameters.
+/// A fitted motion, with the covariance of its parameters.
 pub(crate) struct Fitted {
     pub motion: MarkedMotion,
     parameters: DVector<f64>,
     covariance: DMatrix<f64>,
 }
 
-/// A recording whose motion is to be found.
+/// A recording with an unknown motion.
 struct Problem<'a> {
     time_s: &'a [f64],
     reading: &'a [f64],
-    /// Marks' range of strain, which the law is scaled by.
+    /// Range of the marks' strains, by which the law is scaled.
     range: RangeParams,
     /// Readings over their median in the complete rows.
     response: DVector<f64>,
-    /// The move of each complete row: with a reading, between the first mark and the last.
+    /// Index of the move of each complete row. Such rows have a reading and lie between the first mark and the last.
     of_move: Vec<usize>,
     /// Number of complete rows in each move.
     rows_of_move: Vec<f64>,
 }
 
-/// Fits `motion`, and makes moves irregular that the law does not explain as regular ones.
+/// Fits `motion`. Moves that the law does not explain as regular ones become irregular.
 pub(crate) fn fit(samples: &Samples, mut motion: MarkedMotion, range: RangeParams) -> Result<Fitted, CalibrationError> {
     let stride = samples.len().div_ceil(MOST_ROWS).max(1);
     let thinned = |values: &[f64]| values.iter().copied().step_by(stride).collect::<Vec<f64>>();
@@ -70,17 +70,17 @@ pub(crate) fn fit(samples: &Samples, mut motion: MarkedMotion, range: RangeParam
 }
 
 impl Fitted {
-    /// Strains and their standard deviations at these times; NaN before the first mark and after the last.
+    /// Returns strains and their standard deviations at these times; NaN before the first mark and after the last.
     pub(crate) fn strains(&self, time_s: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let (mut strains, mut sds) = (Vec::with_capacity(time_s.len()), Vec::with_capacity(time_s.len()));
-        // Some rows at a time: derivatives of all rows by all parameters would take gigabytes.
+        // In chunks, because derivatives of all rows with respect to all parameters would take gigabytes.
         for time_s in time_s.chunks(MOST_ROWS) {
             let here = self.motion.strains(&self.parameters, time_s);
             let slopes = slopes(&self.parameters, &here, |z| self.motion.strains(z, time_s));
             let spread = &slopes * &self.covariance;
             let variance = |k: usize| spread.row(k).dot(&slopes.row(k)).max(0.0);
             let sd = |(k, t): (usize, &f64)| self.motion.shape_sd(*t).hypot(variance(k).sqrt());
-            // The maximum of zero and NaN is zero.
+            // Keeps NaN: the maximum of zero and NaN is zero.
             let known = |(sd, strain): (f64, &f64)| if strain.is_finite() { sd } else { f64::NAN };
             sds.extend(time_s.iter().enumerate().map(sd).zip(&here).map(known));
             strains.extend(here);
@@ -89,7 +89,7 @@ impl Fitted {
     }
 }
 
-/// Derivatives of `of` by each parameter, by differences.
+/// Returns the derivatives of `of` with respect to each parameter, by finite differences.
 fn slopes(parameters: &DVector<f64>, here: &[f64], of: impl Fn(&DVector<f64>) -> Vec<f64>) -> DMatrix<f64> {
     let mut slopes = DMatrix::zeros(here.len(), parameters.len());
     for j in 0..parameters.len() {
@@ -102,7 +102,7 @@ fn slopes(parameters: &DVector<f64>, here: &[f64], of: impl Fn(&DVector<f64>) ->
     slopes
 }
 
-/// Median of the moves' mean squared misfits.
+/// Returns the median of the moves' mean squared misfits.
 fn typical(misfits: &[f64]) -> f64 {
     median(misfits.iter().copied().filter(|m| m.is_finite())).unwrap_or(f64::NAN)
 }
@@ -127,13 +127,13 @@ impl<'a> Problem<'a> {
         Ok(Self { time_s, reading, range, response, of_move, rows_of_move })
     }
 
-    /// The samples with the motion's strains for a reference.
+    /// Calls `of` with samples whose reference is the motion's strains.
     fn with_samples<T>(&self, motion: &MarkedMotion, z: &DVector<f64>, of: impl FnOnce(&Samples) -> T) -> T {
         let strain = motion.strains(z, self.time_s);
         of(&Samples { time_s: self.time_s, reading: self.reading, strain: &strain, strain_sd: &[] })
     }
 
-    /// The law's structure: one that no single move has a regressor in to itself.
+    /// Returns the law's structure, with a ridge that keeps any regressor from serving a single move.
     fn structure(&self, motion: &MarkedMotion, z: &DVector<f64>) -> Result<LawStructure, CalibrationError> {
         structure_on_grid(&self.regression(motion, z)?, LawOptions::default(), RIDGE)
     }
@@ -144,7 +144,7 @@ impl<'a> Problem<'a> {
         self.with_samples(motion, z, |samples| LawRegression::on_scale(&[*samples], scale, self.range))
     }
 
-    /// Columns of the law for a motion, in the complete rows.
+    /// Returns the columns of the law for a motion, in the complete rows.
     fn design(
         &self,
         structure: &LawStructure,
@@ -158,7 +158,7 @@ impl<'a> Problem<'a> {
         Ok(DMatrix::from_columns(&structure.design(&regression).columns))
     }
 
-    /// Mean squared misfit of each move by a law that was fitted without it.
+    /// Returns the mean squared misfit of each move by a law that was fitted without it.
     fn misfits_of_moves(&self, design: &DMatrix<f64>, ridge: f64) -> Result<Vec<f64>, CalibrationError> {
         let without = |left_out: usize| {
             let weight = |of_move: &usize| f64::from(u8::from(*of_move != left_out));
@@ -169,7 +169,7 @@ impl<'a> Problem<'a> {
         (0..self.rows_of_move.len()).map(without).collect()
     }
 
-    /// Mean square of the rows of each move; NaN for a move without a row.
+    /// Returns the mean square of the rows of each move; NaN for a move without a row.
     fn means_of_moves(&self, residual: &DVector<f64>) -> Vec<f64> {
         let mut sums = vec![0.0; self.rows_of_move.len()];
         for (r, &k) in residual.iter().zip(&self.of_move) {
@@ -178,8 +178,8 @@ impl<'a> Problem<'a> {
         sums.iter().zip(&self.rows_of_move).map(|(sum, rows)| sum / rows).collect()
     }
 
-    /// Gauss-Newton from the marks as they are: parameters and their covariance, the law's uncertainty in it. `variance` is that of the
-    /// law's error.
+    /// Runs Gauss-Newton from the marks as given. Returns the parameters and their covariance, which includes the law's uncertainty.
+    /// `variance` is that of the law's error.
     fn descend(
         &self,
         motion: &MarkedMotion,
@@ -218,7 +218,7 @@ impl<'a> Problem<'a> {
         Ok((z, last.ok_or(CalibrationError::Singular)?))
     }
 
-    /// Half the weighted squares, with the law that is best there.
+    /// Returns half the weighted squares, penalties included, at the best law for this motion.
     fn cost(
         &self,
         (motion, structure): (&MarkedMotion, &LawStructure),
@@ -242,7 +242,7 @@ struct Weighted<'a> {
 }
 
 impl<'a> Weighted<'a> {
-    /// `ridge` is relative to the variance of each column.
+    /// Prepares the regression; `ridge` is relative to the variance of each column.
     fn new(design: &'a DMatrix<f64>, weights: &'a DVector<f64>, ridge: f64) -> Self {
         let whole = weights.sum();
         let of_column = |(k, column): (usize, nalgebra::DVectorView<f64>)| {
@@ -267,9 +267,9 @@ fn scaled_rows(matrix: &DMatrix<f64>, weights: &DVector<f64>) -> DMatrix<f64> {
     scaled
 }
 
-/// Law and motion, linearised at once.
+/// Law and motion, linearised together.
 struct Linear<'a> {
-    /// Derivatives by the law's weights, then by the motion's parameters.
+    /// Derivatives with respect to the law's weights, then the motion's parameters.
     jacobian: DMatrix<f64>,
     residual: DVector<f64>,
     weights: &'a DVector<f64>,
@@ -301,7 +301,7 @@ impl<'a> Linear<'a> {
         Ok(Self { jacobian, residual, weights, penalty, law })
     }
 
-    /// The step of the motion's parameters, and their covariance.
+    /// Returns the step of the motion's parameters, and their covariance.
     fn step(&self, z: &DVector<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let of_law = self.law.len();
         let weighted = scaled_rows(&self.jacobian, self.weights);

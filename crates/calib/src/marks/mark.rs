@@ -12,30 +12,30 @@ use thiserror::Error;
 pub struct Mark {
     /// Time, or the beginning of the hold, s.
     pub time_s: f64,
-    /// End of the hold, s; without it the readings say whether the body was held, and for how long.
+    /// End of the hold, s; if it is `None`, the readings determine whether the body was held, and for how long.
     pub until_s: Option<f64>,
     /// The strain.
     pub strain: f64,
-    /// Its standard deviation; without it 2 % of the span of all marks.
+    /// Its standard deviation; the default is 2 % of the span of all marks.
     pub strain_sd: Option<f64>,
-    /// Standard deviation of its time, or of both ends of the hold, s; without it 0.2 s, a person's reaction.
+    /// Standard deviation of its time, or of both ends of the hold, s; the default is 0.2 s, a person's reaction time.
     pub time_sd_s: Option<f64>,
 }
 
 impl Mark {
-    /// A strain at a moment.
+    /// Returns a strain at a moment.
     #[must_use]
     pub const fn new(time_s: f64, strain: f64) -> Self {
         Self { time_s, until_s: None, strain, strain_sd: None, time_sd_s: None }
     }
 
-    /// Last time of the mark, s.
+    /// Returns the last time of the mark, s.
     pub(crate) fn end_s(&self) -> f64 {
         self.until_s.unwrap_or(self.time_s)
     }
 }
 
-/// Fault of marks that give no reference. Marks count from zero.
+/// Fault of marks that do not give a reference. Marks count from zero.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum MarksError {
@@ -45,13 +45,13 @@ pub enum MarksError {
         /// Number of marks.
         found: usize,
     },
-    /// All marks have one strain.
+    /// All marks have the same strain.
     #[error("expected at least two different strains, found {strain} in every mark")]
     OneStrain {
         /// The strain.
         strain: f64,
     },
-    /// A number that is NaN, infinite, or a standard deviation that is not positive.
+    /// A number that is NaN or infinite, or a standard deviation that is not positive.
     #[error("expected finite numbers and a positive standard deviation, found {found}")]
     Number {
         /// The mark.
@@ -69,7 +69,7 @@ pub enum MarksError {
         /// Its end, s.
         until_s: f64,
     },
-    /// A mark begins before the one before it ends.
+    /// A mark begins before the previous one ends.
     #[error(
         "expected a time after {before_s} s, where the mark before it ends, found {time_s} s; a body has one strain at a time"
     )]
@@ -78,7 +78,7 @@ pub enum MarksError {
         mark: usize,
         /// Its beginning, s.
         time_s: f64,
-        /// End of the mark before it, s.
+        /// End of the previous mark, s.
         before_s: f64,
     },
     /// A mark lies outside of the recording.
@@ -96,7 +96,7 @@ pub enum MarksError {
 }
 
 impl MarksError {
-    /// The mark to blame; `None` if it is all of them.
+    /// Returns the faulty mark; `None` if all marks together are at fault.
     #[must_use]
     pub const fn mark(&self) -> Option<usize> {
         match self {
@@ -109,7 +109,7 @@ impl MarksError {
     }
 }
 
-/// Checks that marks are in order, within the recording, and of two strains at least. Returns the least and the largest strain.
+/// Checks that marks are in order, within the recording, and of at least two strains. Returns the smallest and the largest strain.
 pub(crate) fn check(marks: &[Mark], time_s: &[f64]) -> Result<(f64, f64), MarksError> {
     let (first_s, last_s) = (time_s.first().copied().unwrap_or(f64::NAN), time_s.last().copied().unwrap_or(f64::NAN));
     let mut before_s = f64::NEG_INFINITY;

@@ -1,9 +1,9 @@
-//! Calibration without a stage: the strain is known at marks, and the motion between them is found with the law.
+//! Calibration without a test stage: the strain is known at marks, and the motion between them is fitted together with the law.
 //!
-//! A person bends to a mark, waits, and comes back; nobody measures on the way. Between two marks the body is taken to move at a common
-//! shape of speed ([`motion`]), to hold where the readings come to rest ([`holds`]), and to keep a pace of its own where the law does not
-//! explain the common shape ([`pace`]). Times and strains of the marks, paces and the law are then fitted at once ([`joint`]); what
-//! comes out is a reference with a standard deviation in every row.
+//! A person bends to a mark, waits, and comes back; nothing measures the strain in between. Between two marks the body is assumed to move
+//! with a common velocity profile ([`motion`]), to hold where the readings come to rest ([`holds`]), and to have a pace of its own where
+//! the law does not explain the common profile ([`pace`]). Times and strains of the marks, paces and the law are then fitted together
+//! ([`joint`]). The result is a reference with a standard deviation in every row.
 
 mod holds;
 mod joint;
@@ -23,10 +23,10 @@ use joint::fit;
 pub use mark::{Mark, MarksError};
 use motion::MarkedMotion;
 
-/// Shapes of moves that are tried: constant speed, and two between it and minimum jerk.
+/// Velocity profiles tried: constant speed, and two between that and minimum jerk.
 const SHAPES: [f64; 3] = [0.0, 0.4, 0.8];
 
-/// A reference that was found from marks.
+/// A reference estimated from marks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MarkedReference {
     /// Strain of each row; NaN before the first mark and after the last.
@@ -41,10 +41,10 @@ pub struct MarkedReference {
     pub moves: usize,
 }
 
-/// References for recordings whose strain is known at marks only; those in `recordings` are not looked at. There is a list of marks for each,
-/// in order of time.
+/// Estimates references for recordings whose strain is known at marks only; the strains in `recordings` are ignored. Each recording has a
+/// list of marks in order of time.
 ///
-/// The common shape of the moves is the one with which an extended Kalman filter, calibrated on it, does best on quarters left out.
+/// The common velocity profile is the one whose calibrated extended Kalman filter scores best on held-out quarters.
 ///
 /// # Errors
 /// [`CalibrationError::Unsupported`] if there are not as many lists as recordings, [`CalibrationError::Marks`] if marks contradict each
@@ -81,7 +81,7 @@ pub fn marked_references(
     recordings.iter().zip(motions(shape)).map(|(samples, motion)| reference(samples, motion, range)).collect()
 }
 
-/// Score of an extended Kalman filter that is calibrated on regular motions; less is better.
+/// Returns the score of an extended Kalman filter that is calibrated on regular motions; smaller is better.
 fn score(recordings: &[Samples], motions: &[MarkedMotion]) -> Result<f64, CalibrationError> {
     let of_one = |(samples, motion): (&Samples, &MarkedMotion)| {
         motion.strains(&DVector::zeros(motion.parameters()), samples.time_s)

@@ -1,4 +1,4 @@
-//! Motion between marks: holds, moves of a common shape, and moves with a pace of their own.
+//! Motion between marks: holds, moves with a common velocity profile, and moves with a pace of their own.
 
 use nalgebra::DVector;
 
@@ -7,18 +7,18 @@ use crate::marks::holds::Stillness;
 use crate::marks::pace::{INNER_KNOTS, Pace};
 use crate::samples::Samples;
 
-/// Standard deviation of a mark's time where none is stated: a person's reaction, s.
+/// Default standard deviation of a mark's time, s: a person's reaction time.
 pub(crate) const TIME_SD_S: f64 = 0.2;
-/// Standard deviation of the ends of a hold that the readings show, s.
+/// Standard deviation of the ends of a hold that is detected from the readings, s.
 const HOLD_SD_S: f64 = 0.6;
-/// Standard deviation of a mark's strain where none is stated, as a fraction of the marks' span.
+/// Default standard deviation of a mark's strain, as a fraction of the marks' span.
 const STRAIN_SD: f64 = 0.02;
-/// Standard deviation of a move's shape in its middle, as a fraction of its distance.
+/// Standard deviation of a move's progress in its middle, as a fraction of its distance.
 const SHAPE_SD: f64 = 0.03;
-/// Least duration of a move, s.
+/// Minimum duration of a move, s.
 const SHORTEST_S: f64 = 1e-3;
 
-/// Progress of a move, 0 to 1, at the fraction `u` of its time: from a constant speed (`shape` 0) to minimum jerk (1).
+/// Returns the progress of a move, 0 to 1, at the fraction `u` of its time: from constant speed (`shape` 0) to minimum jerk (1).
 ///
 /// Source of minimum jerk: Flash and Hogan, *J. Neurosci.* 5 (1985) 1688.
 pub(crate) fn progress(u: f64, shape: f64) -> f64 {
@@ -37,8 +37,8 @@ struct Stop {
     strain_sd: f64,
 }
 
-/// A motion through marks. Its parameters z are in units of their prior standard deviations and have mean zero: two per mark (time and
-/// strain), one more per hold (its end), [`INNER_KNOTS`] per irregular move.
+/// A motion through marks. Its parameters z are in units of their prior standard deviations and have prior mean zero: two per mark (time
+/// and strain), one more per hold (its end), [`INNER_KNOTS`] per irregular move.
 #[derive(Clone, Debug)]
 pub(crate) struct MarkedMotion {
     stops: Vec<Stop>,
@@ -49,7 +49,7 @@ pub(crate) struct MarkedMotion {
 }
 
 impl MarkedMotion {
-    /// Marks that were checked, whose strains span `span`; every move is regular.
+    /// Builds a motion of regular moves through checked marks, whose strains span `span`.
     pub(crate) fn new(samples: &Samples, marks: &[Mark], span: f64, shape: f64) -> Self {
         let stillness = Stillness::new(samples);
         let ends = (samples.time_s.first().copied(), samples.time_s.last().copied());
@@ -74,35 +74,35 @@ impl MarkedMotion {
         Self { paces: vec![None; marks.len() - 1], stops, shape, span }
     }
 
-    /// Number of parameters.
+    /// Returns the number of parameters.
     pub(crate) fn parameters(&self) -> usize {
         let of_stops: usize = self.stops.iter().map(|stop| 2 + usize::from(stop.is_hold)).sum();
         of_stops + INNER_KNOTS * self.irregular()
     }
 
-    /// Number of moves.
+    /// Returns the number of moves.
     pub(crate) fn moves(&self) -> usize {
         self.paces.len()
     }
 
-    /// Number of moves with a pace of their own.
+    /// Returns the number of moves with a pace of their own.
     pub(crate) fn irregular(&self) -> usize {
         self.paces.iter().flatten().count()
     }
 
-    /// Number of holds.
+    /// Returns the number of holds.
     pub(crate) fn holds(&self) -> usize {
         self.stops.iter().filter(|stop| stop.is_hold).count()
     }
 
-    /// The move, with the hold before it, that the time belongs to; `None` before the first mark and after the last.
+    /// Returns the move, including the hold before it, at a time; `None` before the first mark and after the last.
     pub(crate) fn move_at(&self, time_s: f64) -> Option<usize> {
         let (first, last) = (self.stops.first()?, self.stops.last()?);
         let begun = self.stops.partition_point(|stop| stop.arrive_s <= time_s);
         (first.arrive_s..=last.depart_s).contains(&time_s).then(|| begun.saturating_sub(1).min(self.moves() - 1))
     }
 
-    /// Gives moves a pace of their own, as the readings have it.
+    /// Gives moves a pace of their own, estimated from the readings.
     pub(crate) fn make_irregular(&mut self, moves: &[usize], samples: &Samples) {
         for &k in moves {
             let (from_s, until_s) = (self.stops[k].depart_s, self.stops[k + 1].arrive_s);
@@ -110,13 +110,13 @@ impl MarkedMotion {
         }
     }
 
-    /// Strains at these times under parameters `z`; NaN before the first mark and after the last.
+    /// Returns the strains at these times under parameters `z`; NaN before the first mark and after the last.
     pub(crate) fn strains(&self, z: &DVector<f64>, time_s: &[f64]) -> Vec<f64> {
         let moved = self.moved(z);
         time_s.iter().map(|t| moved.strain(*t)).collect()
     }
 
-    /// Standard deviation of a regular move's shape at a time.
+    /// Returns the standard deviation of the strain at a time due to a regular move's shape.
     pub(crate) fn shape_sd(&self, time_s: f64) -> f64 {
         let Some(k) = self.move_at(time_s).filter(|k| self.paces[*k].is_none()) else { return 0.0 };
         let (from, to) = (&self.stops[k], &self.stops[k + 1]);
@@ -124,7 +124,7 @@ impl MarkedMotion {
         SHAPE_SD * (to.strain - from.strain).abs() * 4.0 * u * (1.0 - u)
     }
 
-    /// The motion with its stops moved.
+    /// Returns the motion with its stops displaced by `z`.
     fn moved(&self, z: &DVector<f64>) -> Moved<'_> {
         let mut rest = z.iter().copied();
         let mut next = || rest.next().unwrap_or(0.0);
@@ -145,7 +145,7 @@ impl MarkedMotion {
     }
 }
 
-/// A motion under some parameters.
+/// A motion with given parameters.
 struct Moved<'a> {
     motion: &'a MarkedMotion,
     stops: Vec<Stop>,
@@ -159,7 +159,7 @@ impl Moved<'_> {
         }
         let next = self.stops.partition_point(|stop| stop.arrive_s <= time_s);
         let before = next.checked_sub(1).and_then(|k| self.stops.get(k));
-        // Ends may have moved inwards: the body is there already, or still.
+        // The ends may have moved inward: the body has then already arrived, or has not yet left.
         let (from, to) = match (before, self.stops.get(next)) {
             (Some(from), Some(to)) => (from, to),
             (Some(only), None) | (None, Some(only)) => return only.strain,
@@ -170,7 +170,7 @@ impl Moved<'_> {
         let Some((pace, inner)) = self.motion.paces[next - 1].as_ref().zip(self.inner[next - 1].as_ref()) else {
             return from.strain + distance * progress(u, self.motion.shape);
         };
-        // A move between equal strains may still leave them.
+        // A move between equal strains may still deviate from them.
         let reach = distance.abs().max(0.1 * self.motion.span).copysign(distance);
         from.strain + distance * pace.progress(u) + reach * pace.deviation(u, inner)
     }

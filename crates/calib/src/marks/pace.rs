@@ -4,26 +4,26 @@ use crate::marks::motion::progress;
 use crate::order::extent;
 use crate::samples::Samples;
 
-/// Inner knots of an irregular move, and the prior standard deviation of each, as a fraction of the move's distance.
+/// Number of inner knots of an irregular move, and prior standard deviation of each, as a fraction of the move's distance.
 pub(crate) const INNER_KNOTS: usize = 4;
 const KNOT_SD: f64 = 0.15;
-/// Readings at both ends of a move whose difference is below this fraction of the readings' range say nothing of its pace.
+/// Difference between the readings at the ends of a move, as a fraction of the readings' range, below which they do not determine its pace.
 const LEAST_CHANGE: f64 = 0.08;
-/// Fraction of the readings' activity, as opposed to time, by which knots are placed.
+/// Weight of the readings' activity, as opposed to time, in the placement of knots.
 const BY_ACTIVITY: f64 = 0.8;
 
-/// Pace of a move that is not regular: halfway between the common shape and how far the readings have come, plus a deviation that is
-/// linear between knots. Knots are dense where the readings move.
+/// Pace of an irregular move: the mean of the common progress and that of the readings, plus a deviation that is linear between knots.
+/// Knots are dense where the readings move.
 #[derive(Clone, Debug)]
 pub(crate) struct Pace {
-    /// Fractions of the move's time, and progress there.
+    /// Fractions of the move's time, and the progress at each.
     rows: Vec<(f64, f64)>,
-    /// Fractions of time of all knots, the two ends with them.
+    /// Fractions of time of all knots, including the two ends.
     knots: [f64; INNER_KNOTS + 2],
 }
 
 impl Pace {
-    /// Pace between two times from the readings.
+    /// Estimates the pace between two times from the readings.
     pub(crate) fn new(samples: &Samples, (from_s, until_s): (f64, f64), shape: f64) -> Self {
         let rows = (0..samples.len())
             .filter(|&k| samples.reading[k].is_finite() && (from_s..=until_s).contains(&samples.time_s[k]));
@@ -40,12 +40,12 @@ impl Pace {
         Self { knots: knots(&rows), rows }
     }
 
-    /// Progress at a fraction of the move's time before any deviation.
+    /// Returns the progress at a fraction of the move's time, without deviation.
     pub(crate) fn progress(&self, u: f64) -> f64 {
         interpolate(&self.rows, u)
     }
 
-    /// Deviation of the progress under parameters of the inner knots, in units of their standard deviations.
+    /// Returns the deviation of the progress, given the inner knots in units of their standard deviations.
     pub(crate) fn deviation(&self, u: f64, inner: &[f64; INNER_KNOTS]) -> f64 {
         let value = |k: usize| if (1..=INNER_KNOTS).contains(&k) { KNOT_SD * inner[k - 1] } else { 0.0 };
         let points: [(f64, f64); INNER_KNOTS + 2] = std::array::from_fn(|k| (self.knots[k], value(k)));
@@ -53,7 +53,7 @@ impl Pace {
     }
 }
 
-/// Progress of readings from the first to the last, 0 to 1, never back; `None` if those differ by less than `least`.
+/// Returns the progress of readings from the first to the last, 0 to 1, never decreasing; `None` if these two differ by less than `least`.
 fn reading_progress(readings: &[f64], least: f64) -> Option<Vec<f64>> {
     let few = (readings.len() / 50).max(1);
     let mean = |rows: &[f64]| rows.iter().sum::<f64>() / rows.len().max(1) as f64;
@@ -62,7 +62,7 @@ fn reading_progress(readings: &[f64], least: f64) -> Option<Vec<f64>> {
     ((last - first).abs() >= least).then(|| monotone(&read).into_iter().map(|p| p.clamp(0.0, 1.0)).collect())
 }
 
-/// Mean of the running maximum from the front and the running minimum from the back: values that never fall.
+/// Returns the mean of the running maximum from the front and the running minimum from the back, which never decreases.
 fn monotone(values: &[f64]) -> Vec<f64> {
     let running = |most: &mut f64, x: f64| {
         *most = most.max(x);
@@ -74,7 +74,7 @@ fn monotone(values: &[f64]) -> Vec<f64> {
     forward.zip(backward).map(|(a, b)| 0.5 * (a + b)).collect()
 }
 
-/// Fractions of time with as much of the move between any two of them.
+/// Returns fractions of time that divide the move into equal parts.
 fn knots(rows: &[(f64, f64)]) -> [f64; INNER_KNOTS + 2] {
     let mut travelled = 0.0;
     let mut before = rows.first().map_or(0.0, |row| row.1);
@@ -90,7 +90,7 @@ fn knots(rows: &[(f64, f64)]) -> [f64; INNER_KNOTS + 2] {
     std::array::from_fn(|k| interpolate(&mixed, k as f64 / (INNER_KNOTS + 1) as f64))
 }
 
-/// Linear interpolation between points in ascending order, which begin at (0, 0) or later; the last value beyond them.
+/// Interpolates linearly between points in ascending order, from (0, 0) if they begin later; constant beyond the last one.
 fn interpolate(points: &[(f64, f64)], x: f64) -> f64 {
     let next = points.partition_point(|point| point.0 < x);
     let before = next.checked_sub(1).map_or((0.0, 0.0), |k| points[k]);

@@ -11,25 +11,25 @@ use crate::law::structure::{LawFit, LawStructure};
 use crate::samples::{Samples, usual_step_s};
 use ohmstrain_sensor::RangeParams;
 
-/// The law of one more sensor of the make: a cubic gauge and branches whose time constants are the make's.
+/// The law of one more sensor of the make: a cubic gauge and branches with the make's time constants.
 ///
-/// Everything else is linear in it and so has a normal posterior in closed form. A sensor that relaxes faster or slower than
-/// the make differs in its gains.
+/// The law is linear in all other parameters, which therefore have a normal posterior in closed form. A sensor that relaxes faster or
+/// slower than the make differs in its gains.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LawPrior {
-    /// Strains of the make, which `mean` is scaled with: x is the strain over the span in powers of the gauge and in
-    /// dash-pots, and the distance from the middle over the span in what branches gain with strain.
+    /// Strains of the make, by which `mean` is scaled. In powers of the gauge and in dash-pots, x is the strain over the span; in gains
+    /// that grow with strain, it is the distance from the middle over the span.
     pub range: RangeParams,
     /// Time constants, s, fastest first.
     pub tau_s: Vec<f64>,
-    /// Spectral density of what the law leaves, at low frequency, one-sided in time: variance times twice the time for
-    /// which it lasts, relative to R₀; s.
+    /// Spectral density of the law's residual at low frequency, s, one-sided in time: variance, relative to R₀, times twice the correlation
+    /// time.
     pub error_density_s: f64,
-    /// Mean of: gauge x, x², x³; dash-pots per span and second, stretching and releasing; of every branch the gains,
-    /// stretching and releasing, and their growth with strain. Changes of resistance relative to R₀.
+    /// Mean of: gauge x, x², x³; dash-pots per span and second, stretching and releasing; for every branch the gains, stretching and
+    /// releasing, and their growth with strain. Changes of resistance relative to R₀.
     pub mean: Vec<f64>,
-    /// Covariance of one more sensor, row by row.
+    /// Covariance of one more sensor's weights, row by row.
     pub covariance: Vec<Vec<f64>>,
 }
 
@@ -38,7 +38,7 @@ impl LawPrior {
         StrainScale { centre: 0.5 * (self.range.lower + self.range.upper), span: self.range.span() }
     }
 
-    /// The most probable law of recordings, and the same without each of their blocks.
+    /// Returns the most probable law of recordings, and those without each of their blocks.
     ///
     /// # Errors
     /// If the recordings are too short, or the equations are singular.
@@ -50,20 +50,20 @@ impl LawPrior {
     }
 }
 
-/// Time that a row of the regression, which may be thinned, stands for, s.
+/// Returns the time between rows of the regression, s, which may be thinned.
 fn row_step_s(recordings: &[Samples], regression: &LawRegression) -> f64 {
     let all: usize = recordings.iter().map(Samples::len).sum();
     let taken: usize = regression.recordings.iter().map(|recording| recording.complete.len()).sum();
     usual_step_s(recordings.iter().map(|samples| samples.time_s)) * all as f64 / taken.max(1) as f64
 }
 
-/// Readings as `R₀ (1 + X μ + X δ)` with δ normal around zero: R₀ keeps the mean's size right in one pass.
+/// Readings as `R₀ (1 + X μ + X δ)`, with δ normal around zero; R₀ keeps the scale of the mean right in one pass.
 struct Posterior<'a> {
     structure: LawStructure,
     regression: &'a LawRegression,
     design: Design,
     mean: DVector<f64>,
-    /// Precision of δ in terms of a row's.
+    /// Precision of δ relative to that of a row.
     precision: DMatrix<f64>,
 }
 
@@ -79,7 +79,7 @@ impl<'a> Posterior<'a> {
         for column in &mut design.columns[..design.free] {
             column.component_mul_assign(&of_mean);
         }
-        // Errors of rows that lie nearer than those errors last are as good as one.
+        // Rows that are closer than the correlation time of their errors count as one.
         let row_variance = prior.error_density_s / step_s;
         let precision = Cholesky::new(covariance).ok_or(CalibrationError::Singular)?.inverse() * row_variance;
         Ok(Self { structure, regression, design, mean, precision })

@@ -13,21 +13,19 @@ use ohmstrain_sensor::{
     CorrectionParams, EstimatorKind, EstimatorParams, LawParams, RangeParams, SensorParams, Validity,
 };
 
-/// No two sensors are made more alike than this, relative to the mean; and a variance that keeps a covariance regular,
-/// relative to R₀.
+/// Least assumed spread of a weight between sensors, relative to the mean; and a variance, relative to R₀, that keeps a covariance regular.
 const LEAST_SPREAD: f64 = 0.01;
 const LEAST_VARIANCE: f64 = 1e-8;
 
 impl Prior {
     /// Learns from calibrated sensors of one make. The same sensors in the same order give the same prior.
     ///
-    /// Laws of whatever structure are expressed in the commonest number of branches with its median time constants, by their
-    /// readings for one motion. The standard errors in the sensors' parameters are subtracted from their spread. Those are of
-    /// the fit without its ridge, and so larger than the errors that the law itself has: a tenth of the spread is left in any
-    /// case.
+    /// Laws of any structure are expressed in the commonest number of branches with its median time constants, by their readings for one
+    /// motion. The standard errors of the sensors' parameters are subtracted from their spread. They belong to the fit without a ridge and
+    /// are thus larger than the errors of the law itself, so at least a tenth of the spread is kept.
     ///
     /// # Errors
-    /// If there are fewer than three, they estimate different quantities, or their laws cannot be compared.
+    /// If there are fewer than three sensors, if they estimate different quantities, or if their laws cannot be compared.
     pub fn learn(sensors: &[SensorParams], made_by: &str) -> Result<Self, CalibrationError> {
         let Some(first) = sensors.first().filter(|_| sensors.len() >= FEWEST_SENSORS) else {
             let message = format!("{} sensors; a fleet has at least {FEWEST_SENSORS}", sensors.len());
@@ -78,7 +76,7 @@ fn law(sensors: &[SensorParams], validity: &Validity) -> Result<LawPrior, Calibr
     })
 }
 
-/// The median time constants of the laws with the commonest number of branches, the smaller one of two.
+/// Returns the median time constants, s, of the laws with the commonest number of branches; of equally common ones, the smaller.
 fn time_constants(laws: &[&LawParams]) -> Vec<f64> {
     let count = |branches: usize| laws.iter().filter(|law| law.branches.len() == branches).count();
     let numbers = laws.iter().map(|law| law.branches.len());
@@ -87,8 +85,8 @@ fn time_constants(laws: &[&LawParams]) -> Vec<f64> {
     (0..branches).map(|i| median(of_size().map(|law| law.branches[i].tau_s))).collect()
 }
 
-/// The errors of the sensor that has the median of them, in terms of the spread of all: a few recordings that tell next to
-/// nothing do not speak for the others.
+/// Returns the errors of the sensor with the median errors, relative to the spread of all: a few uninformative recordings should not
+/// represent the others.
 fn usual(mut errors: Vec<DMatrix<f64>>, members: &[DVector<f64>]) -> Option<DMatrix<f64>> {
     let rows: Vec<_> = members.iter().map(DVector::transpose).collect();
     let spread = DMatrix::from_rows(&rows).row_variance();
@@ -101,8 +99,8 @@ fn usual(mut errors: Vec<DMatrix<f64>>, members: &[DVector<f64>]) -> Option<DMat
     (!errors.is_empty()).then(|| errors.swap_remove(errors.len() / 2))
 }
 
-/// Spectral density of the law's error in the default filter, s: variance times twice its correlation time, of the
-/// baseline and of what wanders beside the branches.
+/// Returns the spectral density of the law's error in the default filter, s: variance times twice the correlation time, summed over the
+/// baseline and the branches' noise.
 fn error_density_s(sensor: &SensorParams) -> Option<f64> {
     let noise = sensor.estimators.get(&sensor.filter_of(sensor.default_estimator))?.noise;
     let branches: f64 = sensor.law.branches.iter().map(|branch| branch.tau_s).sum();
@@ -110,7 +108,7 @@ fn error_density_s(sensor: &SensorParams) -> Option<f64> {
     (density > 0.0).then_some(density)
 }
 
-/// Rows of the sensors whose correction is of the commonest filter.
+/// Learns from the rows of the sensors that correct the commonest filter.
 fn correction(sensors: &[SensorParams]) -> Option<CorrectionPrior> {
     let corrections: Vec<&CorrectionParams> = sensors.iter().filter_map(|sensor| sensor.correction.as_ref()).collect();
     let count = |kind: EstimatorKind| corrections.iter().filter(|one| one.corrects == kind).count();
@@ -119,7 +117,7 @@ fn correction(sensors: &[SensorParams]) -> Option<CorrectionPrior> {
     (of_kind.len() >= FEWEST_SENSORS).then(|| CorrectionPrior::learn(&of_kind)).flatten()
 }
 
-/// Calibrated range of the median sensor; readings over R₀.
+/// Returns the median of the sensors' calibrated ranges, with readings over R₀.
 fn of_median(sensors: &[SensorParams]) -> Validity {
     let of = |number: fn(&SensorParams) -> f64| median(sensors.iter().map(number));
     Validity {

@@ -1,8 +1,8 @@
-//! Prior of a make, learned from calibrated sensors: with it a short motion is enough for the next one.
+//! Prior of a make, learned from calibrated sensors; with it, a short motion suffices to calibrate the next one.
 //!
-//! Empirical Bayes: mean and spread over the sensors stand for the prior of one more. The law's regression takes it as
-//! further rows, the search for noise and motion starts from it and is pulled toward it, and the correction learns from some
-//! rows of every sensor beside the new one's own. R₀ is every sensor's own.
+//! Empirical Bayes: mean and spread over the sensors are the prior of one more. The law's regression uses it as further rows. The search
+//! for noise and motion starts from it and is pulled toward it. The correction learns from some rows of every sensor, beside the new one's
+//! own. R₀ is not shared between sensors.
 
 mod law;
 mod learn;
@@ -24,7 +24,7 @@ pub(crate) use rows::ROWS;
 
 use ohmstrain_sensor::{EstimatorKind, Quantity, Validity};
 
-/// Version of the file that a prior is written to.
+/// Version of the format of a prior's file.
 pub const PRIOR_FORMAT: u32 = 2;
 /// Least number of sensors from which a spread can be estimated.
 pub(crate) const FEWEST_SENSORS: usize = 3;
@@ -37,7 +37,7 @@ pub struct Prior {
     pub format: u32,
     /// Program and version that made it.
     pub made_by: String,
-    /// Number of sensors that it was learned from.
+    /// Number of sensors from which it was learned.
     pub sensors: usize,
     /// The estimated quantity.
     pub quantity: Quantity,
@@ -53,12 +53,12 @@ pub struct Prior {
 }
 
 impl Prior {
-    /// The prior of an estimator's noise and motion.
+    /// Returns the prior of an estimator's noise and motion.
     pub(crate) fn estimator(&self, kind: EstimatorKind) -> Option<&EstimatorPrior> {
         self.estimators.get(&kind)
     }
 
-    /// Calibrated range of a sensor with this R₀, joined with that of the others.
+    /// Returns the calibrated range of a sensor with this R₀, joined with that of the others.
     pub(crate) fn joined(&self, own: Validity, rest_reading: f64) -> Validity {
         let of_make = &self.validity;
         Validity {
@@ -78,7 +78,7 @@ impl Prior {
     }
 }
 
-/// The middle one; zero without any.
+/// Returns the median; zero without any values.
 fn median(values: impl IntoIterator<Item = f64>) -> f64 {
     crate::order::median(values).unwrap_or(0.0)
 }

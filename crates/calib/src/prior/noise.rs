@@ -14,7 +14,7 @@ pub struct EstimatorPrior {
     pub ln_mean: Vec<f64>,
     /// Their standard deviations.
     pub ln_sd: Vec<f64>,
-    /// Time over which errors of readings are alike, s.
+    /// Correlation time of the readings' errors, s.
     pub reading_time_s: f64,
     /// Mean strain.
     pub strain_mean: f64,
@@ -24,13 +24,13 @@ pub struct EstimatorPrior {
     pub strain_sd_scale: f64,
 }
 
-/// Smallest standard deviation of a logarithm: searches end where they end by about as much.
+/// Smallest standard deviation of a logarithm: end points of searches scatter by about as much.
 const LEAST_SD: f64 = 0.1;
-/// Stand-in for a speed of zero, of filters that have none.
+/// Replaces a speed of zero in filters without a preferred speed.
 const NO_SPEED: f64 = 1e-12;
 
 impl EstimatorPrior {
-    /// Learns it from several sensors' parameters of the estimator; `None` if there are none, or only some have phases.
+    /// Learns the prior from several sensors' parameters of the estimator; `None` if there are none, or if only some have phases.
     pub(super) fn learn(sensors: &[&EstimatorParams]) -> Option<Self> {
         let points: Vec<DVector<f64>> = sensors.iter().map(|params| point(params)).collect();
         let size = points.first()?.len();
@@ -48,8 +48,8 @@ impl EstimatorPrior {
         })
     }
 
-    /// Penalty on the mean score per row for a step away from the mean: the negative log density of the prior over the
-    /// number of errors in `duration_s` that do not hang together.
+    /// Returns the penalty on the mean score per row for a distance from the mean: the negative log density of the prior over the number of
+    /// independent errors in `duration_s`.
     pub(crate) fn pull(&self, point: &[f64], duration_s: f64) -> f64 {
         let lasts_s = self.ln_mean.get(1).map_or(1.0, |ln| ln.exp());
         let independent = (0.5 * duration_s / lasts_s).max(1.0);
@@ -58,7 +58,7 @@ impl EstimatorPrior {
     }
 }
 
-/// Returns the parameters in the order in which calibration searches.
+/// Returns the parameters in the order of calibration's search.
 fn point(params: &EstimatorParams) -> DVector<f64> {
     let MotionParams { rate_time_s, rate_sd_per_s, strain_sd, .. } = params.motion;
     let noise = params.noise;

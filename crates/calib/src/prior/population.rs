@@ -1,20 +1,20 @@
 use crate::dense::product;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-/// Share of the spread seen that sensors differ by at least, in every direction: what their own errors may take away is
-/// known no better.
+/// Least spread between sensors, as a fraction of the observed spread, in every direction; the errors that are subtracted are not known
+/// well enough for less.
 const LEAST_SHARE: f64 = 0.1;
 
 /// Mean and spread of a population.
 #[derive(Clone, Debug)]
 pub(super) struct Population {
     pub mean: DVector<f64>,
-    /// Covariance of one more member around `mean`, which is itself known from `n` of them.
+    /// Covariance of one more member around `mean`, which is itself an estimate from `n` members.
     pub covariance: DMatrix<f64>,
 }
 
 impl Population {
-    /// Estimates the population from at least two members; `errors` is the covariance of a usual member's own errors, if it is known.
+    /// Estimates the population from at least two members; `errors` is the covariance of a typical member's own errors, if it is known.
     ///
     /// The sample covariance is shrunk toward its diagonal, the errors are subtracted, and the uncertainty of the mean is added:
     /// the predictive distribution of one more member, `N(m, Σ + S/n)`.
@@ -25,13 +25,12 @@ impl Population {
         let seen = shrunken(members, &mean);
         let between = errors.map_or_else(|| seen.clone(), |errors| without(&seen, errors));
         let covariance: DMatrix<f64> = between + seen / n;
-        // Rounding is not symmetric.
+        // Symmetrises, because rounding is not symmetric.
         Self { covariance: 0.5 * (&covariance + covariance.transpose()), mean }
     }
 }
 
-/// The sample covariance with its correlations shrunken toward zero by the share that makes their expected squared error
-/// least.
+/// Returns the sample covariance with its correlations shrunk toward zero by the factor that minimises their expected squared error.
 ///
 /// Source: Schäfer & Strimmer, *Stat. Appl. Genet. Mol. Biol.* 4 (2005) 32, target D.
 fn shrunken(members: &[DVector<f64>], mean: &DVector<f64>) -> DMatrix<f64> {
@@ -61,8 +60,7 @@ fn shrunken(members: &[DVector<f64>], mean: &DVector<f64>) -> DMatrix<f64> {
     })
 }
 
-/// `seen - errors`, kept positive: in the directions in which errors explain more than nine tenths of what is seen, a tenth
-/// of it is left.
+/// Returns `seen - errors`, kept positive: in directions in which errors explain more than nine tenths of `seen`, a tenth of it remains.
 ///
 /// Source: Amemiya, *Am. Stat.* 39 (1985) 112, on between-group covariances that come out negative.
 fn without(seen: &DMatrix<f64>, errors: &DMatrix<f64>) -> DMatrix<f64> {
@@ -90,7 +88,7 @@ mod tests {
         DMatrix::from_element(1, 1, value)
     }
 
-    /// Compares with values by hand: mean 3, squares 4 + 1 + 1 + 4 over three degrees of freedom.
+    /// Compares with values computed by hand: mean 3, squares 4 + 1 + 1 + 4 over three degrees of freedom.
     #[test]
     fn one_number_is_the_normal_normal_model() {
         let members: Vec<DVector<f64>> = [1.0, 2.0, 4.0, 5.0].iter().map(|x| DVector::from_element(1, *x)).collect();
@@ -104,7 +102,7 @@ mod tests {
         }
     }
 
-    /// Schäfer & Strimmer's share written out for two standardised columns: Var(r)/r².
+    /// Compares with Schäfer & Strimmer's shrinkage, written out for two standardised columns: Var(r)/r².
     #[test]
     fn correlations_are_shrunken_by_the_share_that_their_scatter_asks_for() {
         let (first, second) = ([0.0, 1.0, 2.0, 3.0, 4.0], [0.2, 0.7, 2.9, 2.2, 4.0]);

@@ -9,24 +9,24 @@ use crate::law::structure::LawStructure;
 use crate::samples::Samples;
 use ohmstrain_sensor::{LawParameter, LawParams, RangeParams, Uncertainty};
 
-/// Motion over the whole range at three speeds, with holds and smaller loops: laws with the same readings for it are the same.
+/// Motion over the whole range at three speeds, with holds and smaller loops. Laws with the same readings for it count as the same.
 ///
-/// Laws of other structures, and with other time constants, are expressed in one structure by their readings for it.
+/// By these readings, laws of other structures, and with other time constants, are expressed in one structure.
 pub(super) struct Probe {
     regression: LawRegression,
     columns: DMatrix<f64>,
     normal: Cholesky<f64, Dyn>,
 }
 
-/// Stations of the motion, shares of the range; twice the same is a hold.
+/// Stations of the motion, as fractions of the range; the same one twice is a hold.
 const STATIONS: [f64; 11] = [0.0, 1.0, 1.0, 0.0, 0.0, 0.5, 1.0, 0.5, 0.5, 0.2, 0.0];
-/// Speeds, shares of the fastest.
+/// Speeds, as fractions of the fastest.
 const SPEEDS: [f64; 3] = [1.0, 0.3, 0.1];
-/// Rows from one station to the next.
+/// Number of rows from one station to the next.
 const LEG_ROWS: usize = 60;
 /// Duration of a hold, in movements over the whole range.
 const HOLD: f64 = 2.0;
-/// Keeps columns that look alike from making the equations singular; relative to their variance.
+/// Ridge that keeps collinear columns from making the equations singular, relative to their variance.
 const RIDGE: f64 = 1e-6;
 /// Step of the derivatives, relative to a parameter.
 const STEP: f64 = 1e-4;
@@ -35,7 +35,7 @@ impl Probe {
     /// Creates the probe for laws with these time constants; `fastest` is in 1/s.
     pub(super) fn new(range: RangeParams, fastest: f64, tau_s: &[f64]) -> Result<Self, CalibrationError> {
         let (time_s, strain) = motion(range, fastest);
-        // What is read does not matter, but that it changes.
+        // The values of the readings do not matter, as long as they vary.
         let reading: Vec<f64> = strain.iter().map(|strain| 1.0 + (strain - range.lower) / range.span()).collect();
         let samples = Samples::new(&time_s, &reading, &strain)?;
         let regression = robust(LawRegression::new(&[samples])?);
@@ -57,7 +57,7 @@ impl Probe {
         self.normal.solve(&self.columns.tr_mul(&fitted))
     }
 
-    /// Returns the covariance of those weights from that of the law's parameters; undetermined parameters are taken for known.
+    /// Returns the covariance of those weights, given that of the law's parameters; undetermined parameters are treated as known.
     pub(super) fn errors(&self, law: &LawParams, uncertainty: &Uncertainty) -> DMatrix<f64> {
         let mut slopes = DMatrix::zeros(self.columns.ncols(), uncertainty.names.len());
         for (j, name) in uncertainty.names.iter().enumerate() {
@@ -78,7 +78,7 @@ impl Probe {
     }
 }
 
-/// Cubic gauge and branches with these time constants.
+/// Returns a cubic gauge with branches that have these time constants.
 pub(super) fn common(tau_s: &[f64]) -> LawStructure {
     let nonlinear = tau_s.iter().map(|tau_s| tau_s.ln()).collect();
     LawStructure { family: GaugeFamily::Polynomial, nonlinear, taus: tau_s.len(), ridge: 0.0 }

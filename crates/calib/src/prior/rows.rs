@@ -5,18 +5,18 @@ use super::median;
 use crate::calibrate::correction_fit::{PAUSE_S, rounded};
 use ohmstrain_sensor::{CorrectionParams, CorrectionScale, EstimatorKind, FUTURE_FEATURES, TrainingRow};
 
-/// Rows of other sensors that a correction learns from beside the new sensor's own: as many as its own at most.
+/// Number of rows of other sensors that a correction learns from; of the new sensor's own it uses at most as many.
 pub(crate) const ROWS: usize = 100;
-/// A bounded rate is taken back from its bound by this much at least.
+/// Least distance of a bounded rate from its bound before the bound is inverted.
 const LEAST_FROM_BOUND: f64 = 1e-6;
 
-/// The correction of one more sensor of the make: what some moments of every sensor have taught.
+/// The correction of one more sensor of the make, learned from some rows of every sensor.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CorrectionPrior {
     /// The filter that it corrects.
     pub corrects: EstimatorKind,
-    /// Scale of the readings, the median sensor's.
+    /// Scale of the readings of the median sensor.
     pub readings: CorrectionScale,
     /// Rows of all sensors, in order of time.
     pub rows: Vec<TrainingRow>,
@@ -31,7 +31,7 @@ impl CorrectionPrior {
         let mut rows: Vec<TrainingRow> = Vec::new();
         let mut start_s = 0.0;
         for (k, sensor) in sensors.iter().enumerate() {
-            // As many as should have been taken by now, from another place of every sensor.
+            // Tops up to the number of rows due by now, from a different place of every sensor.
             let wanted = ROWS * (k + 1) / sensors.len() - rows.len();
             let first_s = sensor.rows.first().map_or(0.0, |row| row.time_s);
             for i in 0..wanted.min(sensor.rows.len()) {
@@ -45,7 +45,7 @@ impl CorrectionPrior {
     }
 }
 
-/// The median of each number, of starts where they are on the median scale.
+/// Returns the median of each number; starts are first converted to the median scale.
 fn median_scale(scales: &[CorrectionScale]) -> CorrectionScale {
     let of = |number: &dyn Fn(&CorrectionScale) -> f64| median(scales.iter().map(number));
     let (centre, half_range) = (of(&|scale| scale.centre), of(&|scale| scale.half_range));
@@ -63,7 +63,7 @@ fn start_on(scale: &CorrectionScale, [a, b]: [f64; 2], (centre, half_range): (f6
     [(a * scale.half_range + (b - 1.0) * (centre - scale.centre)) / half_range, b]
 }
 
-/// A row as it would have been seen on another scale.
+/// Converts a row to another scale.
 fn moved(row: &TrainingRow, from: &CorrectionScale, to: &CorrectionScale) -> TrainingRow {
     let size = from.half_range / to.half_range;
     let rate = |i: usize, bounded: f64| {
@@ -87,7 +87,7 @@ mod tests {
 
     use super::*;
 
-    /// The features themselves, seen on both scales.
+    /// Compares with the features themselves, computed on both scales.
     #[test]
     fn rows_are_what_the_other_scale_would_have_seen() {
         let scale = |centre, half_range, rates| CorrectionScale { centre, half_range, rates, starts: settled() };

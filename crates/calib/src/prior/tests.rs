@@ -7,8 +7,7 @@ const REST_OHM: f64 = 1700.0;
 const SPAN: f64 = 0.3;
 const RANGE: RangeParams = RangeParams { lower: 0.0, upper: SPAN };
 
-/// Weights of a sensor: gauge 1.8 ε - 1.2 ε², a branch of 4 s with the gains 0.9 and -0.5 that grow by -1.1 and 0.6 per
-/// strain.
+/// Returns the weights of a sensor: gauge 1.8 ε - 1.2 ε², a branch of 4 s with gains 0.9 and -0.5, which grow by -1.1 and 0.6 per strain.
 fn truth() -> Vec<f64> {
     let middle = 0.5 * SPAN;
     let gains = [(0.9 - 1.1 * middle) * SPAN, (-0.5 + 0.6 * middle) * SPAN, -1.1 * SPAN * SPAN, 0.6 * SPAN * SPAN];
@@ -53,7 +52,7 @@ fn gauge(law: &LawParams) -> [f64; 3] {
     coefficients
 }
 
-/// The gain with strain of the fit is that of a row's middle strain: exact to the square of a step, 1e-4. What is left is
+/// The fit takes a gain at the middle strain of a row, which is exact to the square of a step, 1e-4. The remaining differences are
 /// rounding, the Euler steps (1/2000 of a row) and the passes for R₀.
 #[test]
 fn a_prior_of_infinite_spread_leaves_the_recording_alone() {
@@ -75,7 +74,7 @@ fn a_prior_of_no_spread_wins() {
     assert!((law.branches[0].extend_gain - 1.25 * 0.9).abs() < 1e-6);
 }
 
-/// Tests R₀: with the right mean it is the recording's, however tight the prior, from a median reading that is a third larger.
+/// Tests R₀: with the right mean it is that of the recording, however tight the prior, from a median reading that is a third larger.
 #[test]
 fn the_resistance_at_rest_is_the_sensors_own() {
     for variance in [1e-12, 1e-4, 1.0] {
@@ -88,7 +87,7 @@ fn sensor() -> SensorParams {
     toml::from_str(SENSOR).unwrap()
 }
 
-/// A sensor whose resistance changes by `factor` times as much.
+/// Returns a sensor whose resistance changes are larger by `factor`.
 fn scaled(factor: f64) -> SensorParams {
     let mut sensor = sensor();
     let law = &mut sensor.law;
@@ -106,7 +105,7 @@ fn scaled(factor: f64) -> SensorParams {
     sensor
 }
 
-/// Gains 0.8, 1 and 1.2 times a law: its weights, with a deviation of 0.2 of them and 1/3 of that variance more for the mean.
+/// Tests gains of 0.8, 1 and 1.2 times a law: the mean is its weights, the variance (0.2 of them)², plus 1/3 of that for the mean.
 #[test]
 fn mean_and_spread_are_those_of_the_sensors() {
     let prior = Prior::learn(&[scaled(0.8), scaled(1.2), scaled(1.0)], "test").unwrap();
@@ -116,7 +115,7 @@ fn mean_and_spread_are_those_of_the_sensors() {
     assert_eq!(prior.law.tau_s, taus);
     for (i, coefficient) in coefficients.iter().enumerate() {
         let expected = coefficient * span.powi(i as i32 + 1);
-        // The normal equations are kept regular by a millionth; collinear columns make that a hundredth at most.
+        // The normal equations are regularised by a millionth; collinear columns turn that into at most a hundredth.
         let tolerance = 1e-2 * prior.law.mean.iter().map(|x| x.abs()).fold(0.0, f64::max);
         assert!((prior.law.mean[i] - expected).abs() < tolerance, "{i}: {} {expected}", prior.law.mean[i]);
         let variance = prior.law.covariance[i][i] - (0.01 * prior.law.mean[i]).powi(2).max(1e-8);
@@ -146,7 +145,7 @@ fn what_is_written_is_read_and_checked() {
     assert!(Prior::learn(&[scaled(1.0), scaled(1.1)], "test").is_err());
 }
 
-/// The normal prior's density, -1/2 (x - m)²/s², over 40 s / (2 × 8 s) errors that do not hang together.
+/// Compares with the normal density, -1/2 (x - m)²/s², over 40 s / (2 × 8 s) independent errors.
 #[test]
 fn noise_is_pulled_by_the_density_of_the_prior() {
     let prior = EstimatorPrior {

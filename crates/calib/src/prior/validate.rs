@@ -2,21 +2,21 @@ use crate::prior::{CorrectionPrior, EstimatorPrior, FEWEST_SENSORS, LawPrior, Pr
 use ohmstrain_sensor::ranges::{AMOUNT, Allowed, FACTOR, GAIN, POSITIVE, SHARE, SIGNED, Table};
 use ohmstrain_sensor::{EstimatorKind, FieldError, MOST_BRANCHES};
 
-/// Logarithms of what searches may find, and of what has no speed.
+/// Allowed logarithms, including that of the stand-in for no speed.
 const LOGARITHM: Allowed = Allowed { least: -30.0, most: 30.0 };
-/// Rows of other sensors: the work grows with the cube of all rows.
+/// Allowed number of rows of other sensors; the cost grows with the cube of all rows.
 const ROWS: std::ops::RangeInclusive<usize> = 2..=500;
-/// Weights of a law: three of the gauge, two dash-pots, four of a branch.
+/// Number of weights of a law: three of the gauge, two dash-pots, four per branch.
 const WITHOUT_BRANCHES: usize = 5;
 const OF_BRANCH: usize = 4;
-/// Numbers of a filter's noise and motion, without phases and with them.
+/// Number of values of a filter's noise and motion, without and with phases.
 const SIZES: [usize; 2] = [7, 11];
 
 impl Prior {
     /// Checks every number.
     ///
     /// # Errors
-    /// Names the first that is outside of its range.
+    /// Names the first number that is out of range.
     pub fn validate(&self) -> Result<(), FieldError> {
         let root = Table::root();
         if self.sensors < FEWEST_SENSORS {

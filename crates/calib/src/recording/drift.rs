@@ -5,7 +5,7 @@ use crate::samples::Samples;
 /// Least drift from the first to the last quarter of a recording, as a fraction of the range of its readings.
 const NOTICED: f64 = 0.02;
 
-/// True if what the law leaves of a recording's readings grows, or falls, from quarter to quarter: a run that lasts longer goes farther.
+/// True if the law's residuals rise, or fall, from quarter to quarter of a recording; a longer run would drift farther.
 pub(crate) fn drifts(recordings: &[Samples], fit: &LawFit) -> bool {
     recordings.iter().zip(&fit.residuals).zip(&fit.rest_readings).any(|((samples, residuals), rest)| {
         let (low, high) = extent(samples.reading.iter().copied().filter(|reading| reading.is_finite()));
@@ -19,7 +19,7 @@ fn is_drift(means: &[f64], range: f64) -> bool {
     one_way && steps.iter().sum::<f64>().abs() > NOTICED * range
 }
 
-/// Mean residual of each quarter, where it is known.
+/// Returns the mean of the known residuals in each quarter.
 fn quarter_means(residuals: &[f64]) -> Vec<f64> {
     let quarters = residuals.chunks(residuals.len().div_ceil(4).max(1));
     let means = quarters.map(|quarter| {

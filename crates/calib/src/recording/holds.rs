@@ -2,27 +2,27 @@ use std::ops::Range;
 
 use crate::samples::{Samples, filled_strain};
 
-/// A stretch of a recording in which the strain stands still.
+/// A part of a recording in which the strain is constant.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hold {
     /// Its rows.
     pub rows: Range<usize>,
     /// Duration, s.
     pub duration_s: f64,
-    /// The mean reading of its last seconds: where the reading has settled.
+    /// Mean reading of its last seconds, when the reading has settled.
     pub last_reading: f64,
 }
 
 /// Shortest hold, s, that shows where a reading settles.
 pub(crate) const LEAST_HOLD_S: f64 = 20.0;
-/// Share of the strain's range within which a held strain stays, to each side of its middle.
+/// Largest deviation of a held strain from its middle, as a fraction of the strain's range.
 const STILL: f64 = 0.005;
-/// The last reading is the mean from so many seconds before the end to so many; at the very end the next movement may have begun.
+/// Start and end of the mean for the last reading, s before the end of the hold; at the very end the next movement may have begun.
 const LAST_S: (f64, f64) = (6.0, 1.0);
-/// Rows closer than this, s, are looked at once.
+/// Least time between the rows that are checked, s.
 const STEP_S: f64 = 0.2;
 
-/// All holds of at least `least_s`, and never less than 20 s, in order of time. `span` is the range of the strain.
+/// Returns all holds of at least `least_s`, and never less than 20 s, in order of time. `span` is the range of the strain.
 #[must_use]
 pub fn holds(samples: &Samples, span: f64, least_s: f64) -> Vec<Hold> {
     let (time_s, strain) = (samples.time_s, filled_strain(samples));
@@ -43,7 +43,7 @@ pub fn holds(samples: &Samples, span: f64, least_s: f64) -> Vec<Hold> {
     found
 }
 
-/// Rows that are [`STEP_S`] apart, or farther where there are none.
+/// Returns rows that are at least [`STEP_S`] apart.
 fn thinned(time_s: &[f64]) -> Vec<usize> {
     let mut rows: Vec<usize> = Vec::new();
     for (row, now_s) in time_s.iter().enumerate() {
@@ -54,7 +54,7 @@ fn thinned(time_s: &[f64]) -> Vec<usize> {
     rows
 }
 
-/// The last of `rows` up to which the strain has stayed within a range of `width` since the one at `start`.
+/// Returns the last of `rows` up to which the strain stays within a range of `width`, from `start` on.
 fn standing_still(rows: &[usize], strain: &[f64], start: usize, width: f64) -> usize {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     let stays = rows[start..].iter().take_while(|&&row| {
@@ -64,7 +64,7 @@ fn standing_still(rows: &[usize], strain: &[f64], start: usize, width: f64) -> u
     start + stays.count().saturating_sub(1)
 }
 
-/// Mean of the readings between two times; `None` without one.
+/// Returns the mean of the readings between two times; `None` without a reading.
 fn mean_reading(samples: &Samples, from_s: f64, until_s: f64) -> Option<f64> {
     let first = samples.time_s.partition_point(|time_s| *time_s < from_s);
     let rows = samples.time_s[first..].iter().zip(&samples.reading[first..]);
@@ -98,14 +98,14 @@ mod tests {
         let found = holds(&samples, 0.3, 0.0);
         assert_eq!(found.len(), 2, "{found:?}");
         for (hold, [from_s, until_s]) in found.iter().zip([[5.0, 65.0], [70.0, 99.9]]) {
-            // A strain of 1 % of the range is passed within 0.05 s; rows are looked at every 0.2 s.
+            // The strain passes 1 % of the range within 0.05 s; rows are checked every 0.2 s.
             assert!((time_s[hold.rows.start] - from_s).abs() <= 0.3, "{hold:?}");
             assert!((time_s[hold.rows.end - 1] - until_s).abs() <= 0.3, "{hold:?}");
-            // From 6 s to 1 s before the end the reading is, in the mean, that of 3.5 s before it.
+            // The mean reading from 6 s to 1 s before the end is that of 3.5 s before it.
             assert!((hold.last_reading - (1000.0 - until_s + 3.5)).abs() <= 0.3, "{hold:?}");
         }
         assert_eq!(holds(&samples, 0.3, 45.0).len(), 1);
-        // Half a second between rows, of which the reference knows every other one.
+        // Half a second between rows, every other one with a reference.
         let sparse: Vec<f64> =
             strains.iter().enumerate().map(|(k, x)| if k % 10 == 0 { *x } else { f64::NAN }).collect();
         assert_eq!(holds(&Samples::new(&time_s, &reading, &sparse).unwrap(), 0.3, 0.0).len(), 2);

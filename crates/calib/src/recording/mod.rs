@@ -1,4 +1,4 @@
-//! Checks of recordings before anything is fitted to them.
+//! Checks of recordings before the fits.
 
 pub(crate) mod arranged;
 pub(crate) mod drift;

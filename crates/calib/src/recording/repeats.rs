@@ -1,6 +1,6 @@
 use crate::samples::Samples;
 
-/// The longest time, s, for which a number was repeated in recordings; missing readings do not end it.
+/// Returns the longest time, s, for which a reading was repeated in recordings; missing readings do not end a repeat.
 pub(crate) fn longest_repeat_s(recordings: &[Samples]) -> f64 {
     let mut longest: f64 = 0.0;
     for samples in recordings {

@@ -1,21 +1,21 @@
 use crate::order::median;
 use crate::samples::Samples;
 
-/// A strain within this share of the reference's span of zero is zero.
+/// Tolerance around zero strain, as a fraction of the reference's span.
 const ZERO: f64 = 0.01;
 
-/// Measured resistance at rest as a share of the law's R₀: the median over the recordings
-/// that begin at rest, at zero strain; `None` if none does.
+/// Returns the measured resistance at rest over the law's R₀: the median over the recordings that begin at rest, at zero strain; `None` if
+/// none does.
 ///
-/// R₀ of the law is a fitted constant, which the ridge moves: where the sensor moves, the law's gauge and branches make up for the
-/// difference, but it cannot be measured.
+/// The law's R₀ is a fitted constant, biased by the ridge. While the sensor moves, gauge and branches compensate for the difference, but R₀
+/// cannot be measured then.
 pub(crate) fn rest_share(recordings: &[Samples], rest_readings: &[f64], span: f64) -> Option<f64> {
     let measured = recordings.iter().zip(rest_readings);
     let shares = measured.filter_map(|(samples, rest)| Some(reading_before_moving(samples, span)? / rest));
     median(shares)
 }
 
-/// Median reading of the first rows, those at zero strain before the first one that is not.
+/// Returns the median reading of the first rows at zero strain, before the first other one.
 pub(crate) fn reading_before_moving(samples: &Samples, span: f64) -> Option<f64> {
     let at_zero = samples.complete_rows().take_while(|&k| samples.strain[k].abs() <= ZERO * span);
     median(at_zero.map(|k| samples.reading[k]))
@@ -34,7 +34,7 @@ mod tests {
             let samples = Samples::new(&time_s, &reading, &strain).unwrap();
             rest_share(&[samples], &[2000.0], 0.3)
         };
-        // The last row is back at zero, but not rested.
+        // The last row is back at zero strain, but not rested.
         assert_eq!(share([0.0, 0.0, 0.002, 0.3, 0.0]), Some(1004.0 / 2000.0));
         assert_eq!(share([0.1, 0.0, 0.0, 0.3, 0.0]), None);
     }

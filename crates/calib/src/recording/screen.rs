@@ -8,7 +8,7 @@ use crate::law::robust_loss::robust;
 use crate::order::{median, sorted};
 use crate::samples::Samples;
 
-/// A row that calibration does not believe.
+/// A row that calibration distrusts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Distrusted {
     /// Index of the recording, from zero.
@@ -21,32 +21,32 @@ pub struct Distrusted {
     pub doubt: Doubt,
 }
 
-/// Reason for not believing a row.
+/// Reason for distrusting a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Doubt {
-    /// The reading stands far from its neighbours.
+    /// The reading is far from its neighbours.
     Reading {
         /// The reading.
         found: f64,
-        /// The median of the rows around.
+        /// Median of the neighbouring rows.
         around: f64,
     },
-    /// The reference stands far from its neighbours.
+    /// The reference is far from its neighbours.
     Reference {
         /// The reference.
         found: f64,
-        /// The median of the rows around.
+        /// Median of the neighbouring rows.
         around: f64,
     },
-    /// Reading and reference that do not go together: it is unknown which of them is wrong.
+    /// Reading and reference contradict each other; it is unknown which of them is wrong.
     Law {
-        /// Distance from the preliminary law in robust deviations.
+        /// Distance from the preliminary law, in robust standard deviations.
         deviations: f64,
     },
 }
 
-/// Digits of a number that is named: what a conversion of units adds to it is not shown.
+/// Number of digits in messages, which hides the rounding of a unit conversion.
 const DIGITS: usize = 7;
 
 impl fmt::Display for Doubt {
@@ -69,7 +69,7 @@ impl fmt::Display for Doubt {
     }
 }
 
-/// Recordings without what calibration does not believe: such values are missing.
+/// Recordings in which distrusted values are missing.
 #[derive(Clone, Debug)]
 pub struct Screened {
     recordings: Vec<Columns>,
@@ -85,36 +85,35 @@ struct Columns {
     strain_sd: Vec<f64>,
 }
 
-/// Rows to each side that a row is compared with.
+/// Number of rows to each side with which a row is compared.
 const NEIGHBOURS: usize = 3;
-/// A spike stands away from the median of its neighbours by this share of the column's span, at least; by so many times the
-/// spread of those neighbours; and by so many times what one row in ten stands away by, so that a movement of few rows is
-/// none. On eleven public recordings of three materials nothing reaches 0.1 of the span.
+/// Least distance of a spike from the median of its neighbours: as a fraction of the column's span, in multiples of those neighbours'
+/// spread, and in multiples of the 90 % quantile of such distances, so that a movement of few rows is not a spike. On eleven public
+/// recordings of three materials nothing reaches 0.1 of the span.
 const SPIKE: (f64, f64, f64) = (0.25, 8.0, 3.0);
-/// Shares of the sorted values between which the span lies.
+/// Quantiles of the values that bound the span.
 const SPAN: (f64, f64) = (0.02, 0.98);
-/// Rows with a smaller weight in the preliminary law, five robust deviations over the row's own, are not believed if they
-/// are off by this share of the readings' span, too. On those recordings no weight is below 0.57.
+/// Weight in the preliminary law, five robust deviations over the row's own, below which a row is distrusted if it is also off by this
+/// fraction of the readings' span. On those recordings no weight is below 0.57.
 const LEAST_WEIGHT: f64 = 0.2;
 const LEAST_MISFIT: f64 = 0.1;
-/// More rows than this share are no outliers: it is the law that is wrong.
+/// Largest fraction of rows that count as outliers; with more, the law is wrong.
 const MOST_OUTLIERS: f64 = 0.05;
-/// Largest share of the readings' variance that the law may leave on blocks left out. Those recordings leave 0.47 and less,
-/// readings that have nothing to do with the reference 0.98 and more.
+/// Largest fraction of the readings' variance that the law may leave on held-out blocks. Those recordings leave 0.47 and less, readings
+/// unrelated to the reference 0.98 and more.
 const MOST_UNEXPLAINED: f64 = 0.9;
-/// The largest share on the rows that it was fitted to, where it leaves more than that on others: of one extension, one hold and one
-/// release each part is unlike the others. The published protocol, simulated with three materials, leaves 0.04 and less, readings
-/// that have nothing to do with the reference 0.8 and more.
+/// Largest such fraction on the fitted rows, if held-out blocks exceed their limit: in one extension, one hold and one release, no part is
+/// like the others. The published protocol, simulated with three materials, leaves 0.04 and less, readings unrelated to the reference 0.8
+/// and more.
 const MOST_UNEXPLAINED_FITTED: f64 = 0.2;
-/// Ridges tried for that: strong ones extrapolate least.
+/// Ridges tried for that; strong ones extrapolate least.
 const SCREENING_RIDGES: [f64; 3] = [0.1, 0.01, 0.001];
 
-/// Looks for outliers, then for rows whose reading and reference do not go together,
-/// and checks that the readings follow the reference at all. Screening the result again finds only rows that the first
-/// screening uncovered.
+/// Removes outliers, then rows whose reading and reference contradict each other, and checks that the readings follow the reference at all.
+/// A second screening finds only rows that the first one uncovered.
 ///
 /// # Errors
-/// If the recordings are too short or too plain to learn a law from, or the best law explains nothing of them.
+/// If the recordings are too short or vary too little to learn a law from, or if the best law explains nothing.
 pub fn screen(recordings: &[Samples]) -> Result<Screened, CalibrationError> {
     let mut screened = Screened { recordings: Vec::new(), distrusted: Vec::new() };
     for (recording, samples) in recordings.iter().enumerate() {
@@ -153,13 +152,13 @@ impl Columns {
 }
 
 impl Screened {
-    /// The recordings without those rows.
+    /// Returns the recordings without those rows.
     #[must_use]
     pub fn samples(&self) -> Vec<Samples<'_>> {
         self.recordings.iter().map(Columns::samples).collect()
     }
 
-    /// Leaves out the rows that the preliminary law gives next to no weight.
+    /// Leaves out the rows with next to no weight in the preliminary law.
     fn leave_out_misfits(&mut self) -> Result<(), CalibrationError> {
         let misfits = misfits(&self.samples())?;
         for one in misfits {
@@ -171,7 +170,7 @@ impl Screened {
     }
 }
 
-/// Rows whose reading and reference do not go together.
+/// Returns rows whose reading and reference contradict each other.
 fn misfits(samples: &[Samples]) -> Result<Vec<Distrusted>, CalibrationError> {
     let regression = robust(LawRegression::new(samples)?);
     let weights: Vec<f64> = regression.root_weights().iter().map(|root| root * root).collect();
@@ -191,7 +190,7 @@ fn misfits(samples: &[Samples]) -> Result<Vec<Distrusted>, CalibrationError> {
                 row_before = None;
                 continue;
             }
-            // Long recordings are thinned: what lies between two rows that are off is off.
+            // Long recordings are thinned; the rows between two misfits count as misfits.
             let doubt = Doubt::Law { deviations: robust_loss::HUBER / weight };
             let rows = row_before.map_or(row, |before| before + 1)..=row;
             off.extend(rows.map(|row| Distrusted { recording, row, time_s: samples.time_s[row], doubt }));
@@ -202,7 +201,7 @@ fn misfits(samples: &[Samples]) -> Result<Vec<Distrusted>, CalibrationError> {
     Ok(if off.len() as f64 > MOST_OUTLIERS * rows as f64 { Vec::new() } else { off })
 }
 
-/// Rows whose value stands alone, with the value and the median of those around.
+/// Returns isolated values, each with its row and the median of its neighbours.
 ///
 /// Source: Hampel, *J. Am. Stat. Assoc.* 69 (1974) 383, for median and median deviation.
 fn spikes(values: &[f64]) -> Vec<(usize, f64, f64)> {
@@ -225,7 +224,7 @@ fn spikes(values: &[f64]) -> Vec<(usize, f64, f64)> {
     (0..known.len()).filter(|&i| is_spike(i)).map(|i| (known[i], values[known[i]], around[i].0)).collect()
 }
 
-/// Range that holds nearly all known values; `None` without any.
+/// Returns the range that contains nearly all known values; `None` without any.
 fn span(values: &[f64]) -> Option<f64> {
     let known = sorted(values.iter().copied().filter(|value| value.is_finite()));
     let last = known.len().checked_sub(1)?;
@@ -233,11 +232,11 @@ fn span(values: &[f64]) -> Option<f64> {
     Some(at(SPAN.1) - at(SPAN.0))
 }
 
-/// Shares of the readings' variance that the law leaves.
+/// Fractions of the readings' variance that the law leaves.
 struct Unexplained {
-    /// Share on blocks that it was not fitted to, each in turn.
+    /// Fraction on held-out blocks, each in turn.
     left_out: f64,
-    /// Share on the rows that it was fitted to.
+    /// Fraction on the rows of the fit.
     fitted: f64,
 }
 
@@ -269,7 +268,7 @@ mod tests {
             assert_eq!(spikes(&sine(400, per_cycle)), [], "{per_cycle} rows a cycle");
         }
         let steps: Vec<f64> = (0..400).map(|k| f64::from(k / 50 % 2)).collect();
-        // At rest but for three taps, each up and down within ten rows.
+        // At rest except for three taps, each up and down within ten rows.
         let taps: Vec<f64> = (0..400).map(|k| (5.0 - (f64::from(k % 130) - 60.0).abs()).max(0.0)).collect();
         assert_eq!((spikes(&steps), spikes(&taps), spikes(&[1.0; 99])), (vec![], vec![], vec![]));
     }

@@ -4,11 +4,11 @@ use crate::recording::rest::reading_before_moving;
 use crate::samples::Samples;
 use ohmstrain_sensor::Sessions;
 
-/// Standard deviation that both logarithms are expected to have between sessions: R₀ of one carbon-black sensor was 1117 to 1800 Ω on
-/// nine days. It counts as one degree of freedom.
+/// Prior standard deviation of both logarithms between sessions: R₀ of one carbon-black sensor was 1117 to 1800 Ω on nine days. The prior
+/// counts as one degree of freedom.
 const EXPECTED_SD: f64 = 0.15;
 
-/// Standard deviations between recordings; `None` if fewer than two, or fewer than half of them, begin at rest.
+/// Returns the standard deviations between recordings; `None` if fewer than two, or fewer than half of them, begin at rest.
 pub(crate) fn sessions(recordings: &[Samples], rest_readings: &[f64], span: f64) -> Option<Sessions> {
     let share = |(samples, rest): (&Samples, &f64)| Some(reading_before_moving(samples, span)? / rest);
     let starts: Vec<f64> = recordings.iter().zip(rest_readings).filter_map(share).collect();
@@ -18,7 +18,7 @@ pub(crate) fn sessions(recordings: &[Samples], rest_readings: &[f64], span: f64)
     Some(Sessions { rest_sd: sd_of_logarithm(rest_readings), start_sd: sd_of_logarithm(&starts) })
 }
 
-/// Standard deviation of the logarithm, with the prior.
+/// Returns the standard deviation of the logarithm, including the prior.
 fn sd_of_logarithm(values: &[f64]) -> f64 {
     let logarithms = values.iter().map(|value| value.ln());
     let n = values.len() as f64;
@@ -45,7 +45,7 @@ mod tests {
             ];
             sessions(&recordings, &[2000.0, 3000.0], 0.3)
         };
-        // Both begin at half of R₀; R₀ are a factor of 1.5 apart: squares of ln 1.5 / 2 on either side of the mean.
+        // Both begin at half of R₀. The two R₀ differ by a factor of 1.5: squares of ln 1.5 / 2 on either side of the mean.
         let sessions = of(&at_rest, &at_rest).unwrap();
         let squares = 1.5_f64.ln().powi(2) / 2.0;
         assert!((sessions.rest_sd.powi(2) - (0.0225 + squares) / 2.0).abs() < 1e-12, "{sessions:?}");

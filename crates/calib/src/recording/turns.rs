@@ -2,8 +2,8 @@ use ohmstrain_ekf::live::{TurnSeen, TurnWatch};
 
 use crate::samples::Samples;
 
-/// The longest time, s, between two turns of the readings, or an end of a recording and a turn; a reading turns where it goes back by
-/// `turn` as a share of R₀.
+/// Returns the longest time, s, between two turns of the readings, or between a turn and an end of a recording. A reading turns where it
+/// reverses by `turn`, relative to R₀.
 pub(crate) fn longest_unturned_s(recordings: &[Samples], rest_readings: &[f64], turn: f64) -> f64 {
     let longest_of = |(samples, rest_reading): (&Samples, &f64)| {
         let mut watch = TurnWatch::new(TurnSeen { turn, longest_s: f64::INFINITY });
@@ -23,7 +23,7 @@ mod tests {
     use super::longest_unturned_s;
     use crate::samples::Samples;
 
-    /// Up for 4 s, down for 3 s, and still for 9 s: what wavers by less than a turn is still.
+    /// Up for 4 s, down for 3 s, and still for 9 s; fluctuations of less than a turn count as still.
     #[test]
     fn a_rest_lasts_from_the_last_turn_to_the_end() {
         let level = |t: usize| match t {

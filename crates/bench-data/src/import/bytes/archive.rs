@@ -1,4 +1,4 @@
-//! Files that are packed together in a zip: the one with the recording, or arrays of NumPy under their names.
+//! Files in a zip archive: the one with the recording, or arrays of NumPy with their names.
 
 use std::io::{Cursor, Read};
 
@@ -9,7 +9,7 @@ use crate::import::bytes::parquet::RawColumn;
 use crate::import::bytes::zipped;
 use crate::import::error::{ImportError, quoted};
 
-/// Files that a question names.
+/// Largest number of files that a question lists.
 const MOST_NAMED: usize = 6;
 
 /// Content of an archive.
@@ -20,7 +20,7 @@ pub(crate) enum Packed {
     Arrays(Vec<RawColumn>),
 }
 
-/// The file that is wanted of an archive, or the only one.
+/// Returns the requested file of an archive, or the only one.
 pub(crate) fn read(bytes: &[u8], name: &str, wanted: Option<&str>) -> Result<Packed, ImportError> {
     let broken = |error: String| ImportError::unreadable(name, format!("cannot be read as a zip archive: {error}"));
     zipped::check_unpacked(bytes, "unpack it, and take the file with the recording").map_err(broken)?;
@@ -59,7 +59,7 @@ pub(crate) fn read(bytes: &[u8], name: &str, wanted: Option<&str>) -> Result<Pac
     }
 }
 
-/// The columns of arrays that are as long as most others.
+/// Returns the columns of arrays with the commonest length.
 fn arrays_of(arrays: Vec<(String, Vec<u8>)>, name: &str) -> Result<Vec<RawColumn>, ImportError> {
     let mut columns = Vec::new();
     for (file, bytes) in arrays {

@@ -3,27 +3,27 @@ use std::fmt;
 
 use chrono::{Duration, NaiveDate};
 
-/// A cell as its container has it.
+/// A cell as in its container.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) enum Cell<'a> {
-    /// Nothing.
+    /// No content.
     #[default]
     Empty,
     /// Text without blanks around it.
     Text(Cow<'a, str>),
-    /// A number, which has no decimal mark.
+    /// A number in binary form, without a decimal mark.
     Number(f64),
     /// Days since the end of 1899; less than one is a time of day.
     Date(f64),
 }
 
 impl<'a> Cell<'a> {
-    /// A text without the blanks around it.
+    /// Makes a text cell without the blanks around it.
     pub(crate) fn text(text: &'a str) -> Self {
         Self::Text(text.trim().into())
     }
 
-    /// A whole number; as text where a float would round it.
+    /// Makes a cell of a whole number, as text if a float would round it.
     pub(crate) fn count(count: i64) -> Self {
         let number = count as f64;
         if number as i64 == count && number.abs() < 9e15 {
@@ -41,8 +41,8 @@ impl<'a> Cell<'a> {
 /// Cells by row, with the row's number in the file.
 pub(crate) type Rows<'a> = Vec<(u64, Vec<Cell<'a>>)>;
 
-/// The cell as text that reads back as the same number or date. A date goes to the microsecond: a 64-bit number of days
-/// tells no more.
+/// Writes the cell as text that reads back as the same number or date. A date has microseconds, the resolution of a
+/// 64-bit number of days.
 impl fmt::Display for Cell<'_> {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let days = match self {
@@ -52,7 +52,7 @@ impl fmt::Display for Cell<'_> {
             Self::Date(days) => *days,
         };
         let microseconds = (days * 86_400e6).round() as i64;
-        // The day that spreadsheets count too many, 29 February 1900, lies before everything that is recorded.
+        // The extra day in spreadsheets, 29 February 1900, is earlier than any recording.
         let epoch = NaiveDate::from_ymd_opt(1899, 12, 30).and_then(|date| date.and_hms_opt(0, 0, 0));
         match epoch.and_then(|epoch| epoch.checked_add_signed(Duration::microseconds(microseconds))) {
             Some(moment) if days >= 1.0 => write!(out, "{}", moment.format("%Y-%m-%d %H:%M:%S%.6f")),
@@ -62,12 +62,12 @@ impl fmt::Display for Cell<'_> {
     }
 }
 
-/// A column's cells in one allocation for all texts: a million short cells cost little more than their characters.
+/// Cells of a column, with all texts in one allocation: a million short cells cost little more than their characters.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Cells {
     text: String,
     ends: Vec<usize>,
-    /// Numbers of cells that are numbers in their container; not finite for all others, or not there.
+    /// Values of cells that are numbers in their container; not finite, or absent, for all others.
     numbers: Vec<f64>,
 }
 
@@ -78,7 +78,7 @@ impl Cells {
         self.ends.push(self.text.len());
     }
 
-    /// Appends a cell; bytes that its text has.
+    /// Appends a cell and returns the bytes of its text.
     pub(crate) fn push_cell(&mut self, cell: &Cell) -> usize {
         let before = self.text.len();
         match cell {
@@ -105,7 +105,7 @@ impl Cells {
         self.ends.is_empty()
     }
 
-    /// The text of a cell; empty beyond the last one.
+    /// Returns the text of a cell; empty beyond the last one.
     #[must_use]
     pub fn get(&self, row: usize) -> &str {
         let Some(&end) = self.ends.get(row) else { return "" };
@@ -125,12 +125,12 @@ impl Cells {
         out
     }
 
-    /// The texts of all cells.
+    /// Returns the texts of all cells.
     pub fn iter(&self) -> impl Iterator<Item = &str> + Clone {
         (0..self.len()).map(|row| self.get(row))
     }
 
-    /// All cells: numbers of their container as numbers.
+    /// Returns all cells; those that are numbers in their container are numbers.
     pub(crate) fn cells(&self) -> impl Iterator<Item = Cell<'_>> {
         let number = |row: usize| self.numbers.get(row).copied().filter(|number| number.is_finite());
         (0..self.len()).map(move |row| number(row).map_or_else(|| Cell::Text(self.get(row).into()), Cell::Number))

@@ -1,16 +1,15 @@
-//! The container of XLS, a compound file: streams as chains of sectors. Reads one stream, and refuses chains that have no
-//! end.
+//! The container of XLS, a compound file: streams as chains of sectors. This module reads one stream, and refuses endless chains.
 
-/// Sector numbers from here on are no sectors: ends of chains, free ones.
+/// First reserved sector number; such numbers mark ends of chains and free sectors.
 const FIRST_RESERVED: u32 = 0xffff_fffa;
-/// Bytes of the header, of an entry of the directory, and of a sector of short streams.
+/// Sizes of the header, of an entry of the directory, and of a sector of short streams, bytes.
 const HEADER: usize = 512;
 const ENTRY: usize = 128;
 const SHORT_SECTOR: usize = 64;
-/// Streams of fewer bytes stand in short sectors.
+/// Size below which a stream is stored in short sectors, bytes.
 const SHORT: usize = 4096;
 
-/// The stream of this name, of which there may be several; `None` if there is none. Names are compared without case.
+/// Returns the stream with the first of these names that exists; `None` if there is none. Names are compared without case.
 pub(crate) fn stream(bytes: &[u8], names: &[&str]) -> Result<Option<Vec<u8>>, String> {
     let file = File::new(bytes)?;
     let directory = file.sectors.chain(number(bytes, 48)?, &file.table)?;
@@ -38,7 +37,7 @@ fn broken(found: &str) -> String {
 
 struct File<'a> {
     sectors: Sectors<'a>,
-    /// The sector behind each sector.
+    /// Next sector of each sector.
     table: Vec<u32>,
 }
 
@@ -56,7 +55,7 @@ impl<'a> File<'a> {
             _ => return Err(broken("sectors of another size than 512 or 4096 bytes")),
         };
         let sectors = Sectors { bytes: bytes.get(size..).unwrap_or_default(), size };
-        // Where the table stands: in the header, and in a chain whose sectors end with the number of the next one.
+        // Sectors of the table: from the header, and from a chain whose sectors end with the number of the next one.
         let mut places = numbers(bytes.get(76..HEADER).unwrap_or_default());
         let (mut next, mut read) = (number(bytes, 68)?, 0);
         while next < FIRST_RESERVED {
@@ -83,14 +82,14 @@ impl Sectors<'_> {
         self.bytes.len().div_ceil(self.size)
     }
 
-    /// A sector; the last one may be short.
+    /// Returns a sector; the last one may be short.
     fn get(&self, sector: u32) -> Result<&[u8], String> {
         let start = (sector as usize).saturating_mul(self.size);
         let rest = self.bytes.get(start..).filter(|rest| !rest.is_empty());
         rest.map(|rest| &rest[..rest.len().min(self.size)]).ok_or_else(|| broken("a sector beyond its end"))
     }
 
-    /// The bytes of a chain; none if there is no first sector.
+    /// Returns the bytes of a chain; none if there is no first sector.
     fn chain(&self, first: u32, table: &[u32]) -> Result<Vec<u8>, String> {
         let (mut out, mut next, mut read) = (Vec::new(), first, 0);
         while next < FIRST_RESERVED {
@@ -114,7 +113,7 @@ fn numbers(bytes: &[u8]) -> Vec<u32> {
     bytes.as_chunks().0.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect()
 }
 
-/// The name of an entry, in UTF-16 up to a NUL.
+/// Returns the name of an entry, in UTF-16 up to a NUL.
 fn name(entry: &[u8]) -> String {
     let units = entry[..64].as_chunks().0.iter().map(|bytes| u16::from_le_bytes(*bytes));
     let units: Vec<u16> = units.take_while(|unit| *unit != 0).collect();

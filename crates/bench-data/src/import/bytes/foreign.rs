@@ -1,9 +1,9 @@
-//! Containers that are not read, by what they begin with, and the line that makes one of them readable.
+//! Containers that are not supported, by their first bytes, with a command that converts each of them.
 
-/// A container: its name, what it begins with and where, and how it is converted.
+/// A container: its name, the offset of its signature, the signature, and how it is converted.
 type Container = (&'static str, usize, &'static [u8], &'static str);
 
-/// Advice for a format that the Python package reads, with the package that it needs for it.
+/// Advice for a format that the Python package reads, with the additional package that it needs.
 macro_rules! of_python {
     ($package:literal) => {
         concat!(
@@ -89,7 +89,7 @@ const KNOWN: [Container; 34] = [
 const PICKLE: &str =
     "python3 -c \"import pandas; pandas.DataFrame(pandas.read_pickle('FILE')).to_csv('out.csv', index=False)\"";
 
-/// Returns the name of a format that is not read, and a way to convert the file.
+/// Returns the name of an unsupported format, and a way to convert the file.
 pub(crate) fn refusal(bytes: &[u8], file: &str) -> Option<String> {
     let begins = |(_, place, magic, _): &&Container| bytes.get(*place..).is_some_and(|rest| rest.starts_with(magic));
     let (name, _, _, way) = KNOWN.iter().find(begins)?;
@@ -114,7 +114,7 @@ mod tests {
         assert!(said(b"SQLite format 3\0...").contains("sqlite3 -csv -header run.bin"));
         assert!(said(b"%PDF-1.7").contains("numbers behind it"));
         assert_eq!(said(b"time_s,resistance_ohm\n"), "");
-        // No two messages take more than a line, and none is of a text that begins with a number.
+        // No conversion takes more than a line, and no signature but that of 7z begins with a digit, as numbers do.
         assert!(
             KNOWN
                 .iter()

@@ -1,4 +1,4 @@
-//! JSON in the order in which it is written.
+//! JSON with its order preserved.
 
 use std::fmt;
 
@@ -15,7 +15,7 @@ pub(crate) enum Json {
     Object(Vec<(String, Json)>),
 }
 
-/// Values that follow each other, each with the number of its line, and the lines that are none, without a value.
+/// Returns successive values, each with its line number; a line that is not JSON has no value.
 pub(crate) fn values(text: &str) -> Vec<(u64, Option<Json>)> {
     let (mut out, mut start, mut line) = (Vec::new(), 0, 1_u64);
     while start < text.len() {
@@ -34,7 +34,7 @@ pub(crate) fn values(text: &str) -> Vec<(u64, Option<Json>)> {
         out.push((line, value));
         line += newlines(&text[start..start + end]);
         start += end;
-        // Objects in a list without its brackets have commas between them.
+        // Objects of a list without its brackets are separated by commas.
         start += usize::from(text[start..].starts_with(','));
     }
     out

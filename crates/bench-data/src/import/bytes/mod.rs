@@ -1,4 +1,4 @@
-//! Contents of a file: gzip unpacked, containers opened, text decoded. The meaning of cells is not considered here.
+//! Contents of a file: gzip is unpacked, containers are opened, text is decoded. The meaning of cells is not considered here.
 
 mod archive;
 pub(crate) mod bounds;
@@ -32,12 +32,12 @@ pub(crate) enum Contents {
     /// Text and its encoding.
     Text(String, &'static str),
     Sheets(NamedSheets),
-    /// Columns, all of them with as many rows, and what the container is called.
+    /// Columns, all with the same number of rows, and the name of the container.
     Columns(Vec<RawColumn>, &'static str),
 }
 
-/// The contents of a file of any kind, and what it was packed in, `gzip, `. `sheet` is the one wanted of a workbook, or the
-/// file wanted of an archive.
+/// Returns the contents of a file of any kind, and a prefix for its packing, such as `gzip, `. `sheet` is the requested sheet of a
+/// workbook, or the requested file of an archive.
 pub(crate) fn open(mut bytes: Vec<u8>, name: &str, sheet: Option<&str>) -> Result<(Contents, String), ImportError> {
     let mut wrappings = Vec::new();
     loop {
@@ -50,7 +50,7 @@ pub(crate) fn open(mut bytes: Vec<u8>, name: &str, sheet: Option<&str>) -> Resul
             wrappings.push("gzip, ");
         } else if bytes.starts_with(PK) && zipped::is_archive(&bytes) {
             let broken = "cannot be read as a zip archive: expected files, found others";
-            // What is wanted of an archive is no sheet of what is in it.
+            // The request for a file of an archive is not one for a sheet in that file.
             let wanted = sheet.filter(|_| !wrappings.contains(&ZIP));
             match guarded(name, broken, || archive::read(&bytes, name, wanted))? {
                 archive::Packed::File(file) => bytes = file,
@@ -65,7 +65,7 @@ pub(crate) fn open(mut bytes: Vec<u8>, name: &str, sheet: Option<&str>) -> Resul
     }
 }
 
-/// Prefix of the format of a file in a zip archive.
+/// Format prefix of a file in a zip archive.
 const ZIP: &str = "zip, ";
 /// First bytes of a zip container.
 const PK: &[u8] = b"PK\x03\x04";
@@ -73,7 +73,7 @@ const PK: &[u8] = b"PK\x03\x04";
 const NO_WORKBOOK: &str = "cannot be read as a workbook: expected records and places in a sheet, found others: save the sheet \
                            with the recording as CSV";
 
-/// The contents of a file that is not packed.
+/// Returns the contents of a file that is not packed.
 fn contents(bytes: Vec<u8>, name: &str, sheet: Option<&str>) -> Result<Contents, ImportError> {
     if ParquetText::is_one(&bytes) {
         let expected = "cannot be read as Parquet: expected pages of values, found others";
@@ -95,12 +95,12 @@ fn contents(bytes: Vec<u8>, name: &str, sheet: Option<&str>) -> Result<Contents,
     Ok(Contents::Text(text, encoding))
 }
 
-/// Calls a library that reads a container. Libraries panic at some containers that are cut, and at impossible places and sizes.
+/// Calls a library that reads a container. Libraries panic on some truncated containers, and on impossible places and sizes.
 fn guarded<T>(name: &str, expected: &str, read: impl FnOnce() -> Result<T, ImportError>) -> Result<T, ImportError> {
     catch_unwind(AssertUnwindSafe(read)).unwrap_or_else(|_| Err(ImportError::unreadable(name, expected)))
 }
 
-/// Contents of gzip data.
+/// Unpacks gzip data.
 fn unpacked(bytes: &[u8], name: &str) -> Result<Vec<u8>, ImportError> {
     let mut inner = Vec::new();
     let read = flate2::read::MultiGzDecoder::new(bytes).take(LARGEST_FILE + 1).read_to_end(&mut inner);

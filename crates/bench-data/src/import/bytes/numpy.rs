@@ -5,10 +5,10 @@ use crate::import::bytes::parquet::RawColumn;
 
 /// First bytes of such a file.
 pub(crate) const MAGIC: &[u8] = b"\x93NUMPY";
-/// Columns of an array; one with more of them is something else.
+/// Largest number of columns of an array; one with more of them is not a recording.
 const MOST_COLUMNS: usize = 1000;
 
-/// The columns of an array: of a table, or of a list of records; `name` is that of the array, if it has one.
+/// Returns the columns of an array, which is a table or a list of records; `name` is that of the array, if it has one.
 pub(crate) fn columns(bytes: &[u8], name: &str) -> Result<Vec<RawColumn>, String> {
     let (header, data) = header(bytes).ok_or("expected the header of a NumPy array, found another")?;
     let shape = shape(header).ok_or("expected the shape of a NumPy array, found none")?;
@@ -18,7 +18,7 @@ pub(crate) fn columns(bytes: &[u8], name: &str) -> Result<Vec<RawColumn>, String
     let size: usize = fields.iter().map(|field| field.kind.size).sum();
     let (rows, across) = match shape[..] {
         [rows] => (rows, 1),
-        // A single line is a column, too.
+        // A single line is also a column.
         [1, rows] => (rows, 1),
         [rows, across] => (rows, across),
         _ => return Err(format!("expected an array of one or two dimensions, found {}", shape.len())),
@@ -51,7 +51,7 @@ pub(crate) fn columns(bytes: &[u8], name: &str) -> Result<Vec<RawColumn>, String
     Ok(out)
 }
 
-/// The text of the header, a Python dictionary, and the bytes behind it.
+/// Returns the text of the header, a Python dictionary, and the bytes after it.
 fn header(bytes: &[u8]) -> Option<(&str, &[u8])> {
     let behind = bytes.strip_prefix(MAGIC)?;
     let (length, start) = match behind.first()? {
@@ -62,7 +62,7 @@ fn header(bytes: &[u8]) -> Option<(&str, &[u8])> {
     Some((std::str::from_utf8(header).ok()?, data))
 }
 
-/// Returns the text behind a key of the header.
+/// Returns the text after a key of the header.
 fn entry<'a>(header: &'a str, key: &str) -> Option<&'a str> {
     let (_, behind) = header.split_once(&format!("'{key}':"))?;
     Some(behind.trim_start())
@@ -73,7 +73,7 @@ fn shape(header: &str) -> Option<Vec<usize>> {
     inside.split(',').map(str::trim).filter(|part| !part.is_empty()).map(|part| part.parse().ok()).collect()
 }
 
-/// A number in each element, under its name in a record.
+/// A number in each element, with its name in a record.
 struct Field {
     name: String,
     kind: Kind,
@@ -88,7 +88,7 @@ fn fields(header: &str) -> Option<Vec<Field>> {
     let (list, _) = described.strip_prefix('[')?.split_once(']').filter(|(list, _)| !list.contains('['))?;
     let texts: Vec<&str> = list.split('\'').skip(1).step_by(2).collect();
     let field = |pair: &[&str]| Some(Field { name: pair[0].to_owned(), kind: Kind::of(pair.get(1)?)? });
-    // A field that has a shape of its own is more than a number.
+    // A field with a shape of its own is more than a single number.
     let are_numbers = list.matches('(').count() * 2 == texts.len();
     are_numbers.then(|| texts.chunks(2).map(field).collect())?
 }
@@ -121,13 +121,13 @@ impl Kind {
         is_known.then_some(Self { is_big_endian, letter, size, unit })
     }
 
-    /// The unit of dates and durations.
+    /// Returns the unit of dates and durations.
     fn unit(&self) -> Option<String> {
         let unit = self.unit.as_deref()?;
         ["s", "ms", "us", "ns"].contains(&unit).then(|| unit.to_owned())
     }
 
-    /// The number that bytes begin with.
+    /// Reads the number at the start of the bytes.
     fn cell(&self, bytes: &[u8]) -> Cell<'static> {
         let mut word = [0; 8];
         for (place, out) in word.iter_mut().take(self.size).enumerate() {
@@ -137,18 +137,18 @@ impl Kind {
         let whole = (bits << (64 - 8 * self.size)) as i64 >> (64 - 8 * self.size);
         match (self.letter, self.size) {
             ('f', 8) => Cell::Number(f64::from_bits(bits)),
-            // By its own digits: 0.1 in single precision is meant to be 0.1.
+            // Single precision is read by its own shortest decimal digits: 0.1 means 0.1.
             ('f', 4) => f32::from_bits(bits as u32).to_string().parse().map_or(Cell::Empty, Cell::Number),
             ('f', _) => Cell::Number(half(bits as u16)),
             ('u' | 'b', _) => i64::try_from(bits).map_or_else(|_| Cell::Text(bits.to_string().into()), Cell::count),
-            // What is not a time.
+            // NaT, which is not a time.
             ('M' | 'm', _) if whole == i64::MIN => Cell::Empty,
             _ => Cell::count(whole),
         }
     }
 }
 
-/// A number of 16 bits.
+/// Decodes a 16-bit float.
 fn half(bits: u16) -> f64 {
     let (exponent, fraction) = (i32::from(bits >> 10 & 31), f64::from(bits & 1023) / 1024.0);
     let size = match exponent {
@@ -164,7 +164,7 @@ fn half(bits: u16) -> f64 {
 mod tests {
     use super::*;
 
-    /// An array as NumPy writes it.
+    /// Returns an array as NumPy writes it.
     fn array(described: &str, order: &str, shape: &str, data: &[u8]) -> Vec<u8> {
         let header = format!("{{'descr': {described}, 'fortran_order': {order}, 'shape': {shape}, }}\n");
         [MAGIC, &[1, 0], &(header.len() as u16).to_le_bytes(), header.as_bytes(), data].concat()

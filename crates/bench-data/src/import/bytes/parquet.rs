@@ -9,7 +9,7 @@ use crate::import::bytes::cell::{Cell, Cells};
 use crate::import::error::ImportError;
 use crate::parquet_text::broken;
 
-/// A column whose name and unit the container knows.
+/// A column with a name and a unit from its container.
 pub(crate) struct RawColumn {
     pub heading: String,
     /// The unit of the column's type, which is not part of its name.
@@ -26,7 +26,7 @@ pub(crate) fn read(bytes: Vec<u8>, name: &str) -> Result<Vec<RawColumn>, ImportE
         |field: &Type| RawColumn { heading: field.name().to_owned(), unit: time_unit(field), cells: Cells::default() };
     let mut columns: Vec<RawColumn> = fields.iter().map(|field| column(field)).collect();
     let (mut rows, mut left) = (0, LARGEST_FILE as usize);
-    // A run of equal values takes no more room in the file than one of them.
+    // A run of equal values takes no more room in the file than a single value.
     for row in reader.get_row_iter(None).map_err(broken)? {
         rows += 1;
         check_cells(name, rows, columns.len())?;
@@ -44,7 +44,7 @@ pub(crate) fn read(bytes: Vec<u8>, name: &str) -> Result<Vec<RawColumn>, ImportE
     Ok(columns)
 }
 
-/// The unit of a timestamp or a time of day, which arrive as counts.
+/// Returns the unit of a timestamp or a time of day, which are stored as counts.
 fn time_unit(field: &Type) -> Option<String> {
     let unit = match field.get_basic_info().logical_type_ref()? {
         LogicalType::Timestamp(kind) => kind.unit,
@@ -65,7 +65,7 @@ fn cell(field: &Field) -> Cell<'_> {
         Field::TimestampMillis(count) | Field::TimestampMicros(count) | Field::TimeMicros(count) => Cell::count(*count),
         Field::Long(count) => Cell::count(*count),
         Field::TimeMillis(count) | Field::Int(count) => Cell::Number(f64::from(*count)),
-        // By its own digits: 0.1 in single precision is meant to be 0.1.
+        // Single precision is read by its own shortest decimal digits: 0.1 means 0.1.
         Field::Float(value) => value.to_string().parse().map_or(Cell::Empty, Cell::Number),
         Field::Double(value) => Cell::Number(*value),
         Field::Str(text) => Cell::text(text),

@@ -1,4 +1,4 @@
-//! The cells of a sheet that have something in them, and the rows that these make.
+//! The filled cells of a sheet, and the rows that they form.
 
 use crate::import::bytes::bounds::{LARGEST_WORKBOOK, MOST_SHEET_CELLS, MOST_SHEET_COLUMNS, mib};
 use crate::import::bytes::cell::{Cell, Rows};
@@ -6,7 +6,7 @@ use crate::import::bytes::cell::{Cell, Rows};
 /// Sheets of a workbook by their names.
 pub(crate) type NamedSheets = Vec<(String, Rows<'static>)>;
 
-/// Cells and bytes that the sheets of a workbook may still hold.
+/// Remaining number of cells and bytes for the sheets of a workbook.
 pub(crate) struct Budget {
     cells: usize,
     bytes: u64,
@@ -18,11 +18,11 @@ impl Default for Budget {
     }
 }
 
-/// Reason for refusing a workbook that holds too much.
+/// Reason for refusing a workbook that is too large.
 pub(crate) type TooMuch = String;
 
 impl Budget {
-    /// Takes so many cells, of so many bytes in all.
+    /// Takes cells, with this many bytes in all, from the budget.
     pub(crate) fn take(&mut self, cells: usize, bytes: u64) -> Result<(), TooMuch> {
         let too_many = || {
             format!(
@@ -49,7 +49,7 @@ pub(crate) struct Sheet {
 }
 
 impl Sheet {
-    /// Takes a cell that is not empty; one that is there already is replaced.
+    /// Adds a cell that is not empty; it replaces one in the same place.
     pub(crate) fn push(&mut self, place: (u32, u32), cell: Cell<'static>, budget: &mut Budget) -> Result<(), TooMuch> {
         match &cell {
             Cell::Empty => return Ok(()),
@@ -60,7 +60,7 @@ impl Sheet {
         Ok(())
     }
 
-    /// Rows that are not empty, with their numbers, from the first column that is not empty to the last.
+    /// Returns rows that are not empty, with their numbers, from the first column that is not empty to the last.
     pub(crate) fn rows(mut self, budget: &mut Budget) -> Result<Rows<'static>, TooMuch> {
         self.cells.sort_by_key(|(row, column, _)| (*row, *column));
         let columns = || self.cells.iter().map(|(_, column, _)| *column);
@@ -86,7 +86,7 @@ impl Sheet {
     }
 }
 
-/// Refuses a sheet with a cell far away in its last column.
+/// Refuses a sheet that is too large; the message names a cell in its last column, which may be a stray one.
 pub(crate) fn check_size((row, column): (u32, u32), height: usize, width: usize) -> Result<(), TooMuch> {
     if width <= MOST_SHEET_COLUMNS && width.saturating_mul(height) <= MOST_SHEET_CELLS {
         return Ok(());
@@ -99,7 +99,7 @@ pub(crate) fn check_size((row, column): (u32, u32), height: usize, width: usize)
     ))
 }
 
-/// The name of a column, counted from 0: A, B, … Z, AA.
+/// Returns the name of a column, counted from 0: A, B, … Z, AA.
 fn letters(column: u32) -> String {
     let (mut left, mut name) = (u64::from(column) + 1, Vec::new());
     while left > 0 {
@@ -141,7 +141,7 @@ mod tests {
     fn a_cell_far_to_the_right_is_named() {
         let error = rows(&[(0, 0), (1_048_575, 16_383)]).unwrap_err();
         assert!(error.contains("cell XFD1048576") && error.contains("2 rows of 16384 columns"), "{error}");
-        // Cells that stand alone in their rows and columns, each of them near the others.
+        // Cells that are alone in their rows and columns, each near the others.
         let diagonal: Vec<(u32, u32)> = (0..20_000).map(|place| (place, place % 4096)).collect();
         assert!(rows(&diagonal).unwrap_err().contains("20000 rows of 4096 columns"));
     }

@@ -4,13 +4,13 @@ use crate::MOST_ROWS;
 use crate::error::Fault;
 use crate::import::bytes::bounds::LONGEST_LINE;
 
-/// Text has fewer NUL bytes than one in so many.
+/// Inverse of the fraction of NUL bytes below which bytes count as text.
 const MOST_NULS: usize = 50;
 
-/// Text out of bytes, and what it was encoded in.
+/// Decodes text, and returns it with the name of its encoding.
 ///
-/// A byte-order mark decides; without one, NUL bytes in every other place mean UTF-16, and what is not UTF-8 is taken for
-/// Windows-1252, which has Latin-1 in it and gives every byte a character. `None` for what is no text.
+/// A byte-order mark decides. Without one, NUL bytes in every other place mean UTF-16; bytes that are not UTF-8 are read as Windows-1252,
+/// which includes Latin-1 and has a character for every byte. `None` if the bytes are not text.
 pub(crate) fn decode(bytes: Vec<u8>) -> Option<(String, &'static str)> {
     let decoded = |encoding: &'static Encoding, bytes| encoding.decode_without_bom_handling(bytes).0.into_owned();
     if let Some((encoding, mark)) = Encoding::for_bom(&bytes) {
@@ -23,7 +23,7 @@ pub(crate) fn decode(bytes: Vec<u8>) -> Option<(String, &'static str)> {
         let encoding = match (nuls(0), nuls(1)) {
             (0, odd) if odd * 4 > head.len() => Some(UTF_16LE),
             (even, 0) if even * 4 > head.len() => Some(UTF_16BE),
-            // A few are what a serial line brings when it is opened.
+            // A serial line brings a few when it is opened.
             (even, odd) if (even + odd) * MOST_NULS < head.len() => None,
             _ => return None,
         };
@@ -38,10 +38,10 @@ pub(crate) fn decode(bytes: Vec<u8>) -> Option<(String, &'static str)> {
     })
 }
 
-/// Lines that are not blank, with their numbers, whatever ends them.
+/// Splits text into lines that are not blank, with their numbers, at any line ending.
 ///
 /// # Errors
-/// The line that is too long, or one too many.
+/// The first line that is too long, or one too many.
 pub(crate) fn lines(text: &str) -> Result<Vec<(u64, &str)>, (u64, Fault)> {
     let ends: &[char] = if text.contains('\n') { &['\n'] } else { &['\r', '\n'] };
     let numbered = text.split(ends).zip(1..).map(|(line, number)| (number, line.trim_end_matches('\r')));

@@ -11,7 +11,7 @@ use crate::import::error::ImportError;
 /// First bytes of XLS.
 pub(crate) const XLS: [u8; 4] = [0xd0, 0xcf, 0x11, 0xe0];
 
-/// Reads all sheets of a workbook, or the one that is wanted: XLSX, XLSM, XLSB, XLS or ODS.
+/// Reads all sheets of a workbook, or the requested one: XLSX, XLSM, XLSB, XLS or ODS.
 pub(crate) fn read(bytes: &[u8], name: &str, wanted: Option<&str>) -> Result<NamedSheets, ImportError> {
     let broken = |error| ImportError::unreadable(name, format!("cannot be read as a workbook: {error}"));
     let (all, found) = sheets(bytes, wanted).map_err(broken)?;
@@ -22,7 +22,7 @@ pub(crate) fn read(bytes: &[u8], name: &str, wanted: Option<&str>) -> Result<Nam
     Ok(found)
 }
 
-/// The names of all sheets, and the rows of those wanted.
+/// Returns the names of all sheets, and the rows of the requested ones.
 fn sheets(bytes: &[u8], wanted: Option<&str>) -> Result<(Vec<String>, NamedSheets), String> {
     let mut book = open(bytes)?;
     let (all, mut budget, mut found) = (book.sheet_names(), Budget::default(), Vec::new());
@@ -33,7 +33,7 @@ fn sheets(bytes: &[u8], wanted: Option<&str>) -> Result<(Vec<String>, NamedSheet
     Ok((all, found))
 }
 
-/// Opens a workbook, once its size is known.
+/// Opens a workbook after checking its size.
 fn open(bytes: &[u8]) -> Result<Sheets<Cursor<&[u8]>>, String> {
     let source = Cursor::new(bytes);
     if bytes.starts_with(&XLS) {
@@ -50,7 +50,7 @@ fn open(bytes: &[u8]) -> Result<Sheets<Cursor<&[u8]>>, String> {
     }
 }
 
-/// The cells of a sheet. A sheet of another kind, such as a chart, has none.
+/// Returns the cells of a sheet. A sheet of another kind, such as a chart, has none.
 fn read_cells(book: &mut Sheets<Cursor<&[u8]>>, name: &str, budget: &mut Budget) -> Result<Sheet, String> {
     let mut sheet = Sheet::default();
     let range = match book {

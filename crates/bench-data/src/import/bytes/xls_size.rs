@@ -1,17 +1,17 @@
-//! Counts the cells of an XLS workbook, whose reader makes room for all between the first and the last one.
+//! Counts the cells of an XLS workbook, whose reader allocates memory for all cells between the first and the last one.
 
 use crate::import::bytes::compound;
 use crate::import::bytes::sheet::{Budget, TooMuch, check_size};
 
-/// Types of records: where a sheet begins, begin and end of a part, and the extent of a sheet.
+/// Types of records: start of a sheet, begin and end of a part, and the extent of a sheet.
 const SHEET: u16 = 0x0085;
 const BEGIN: u16 = 0x0809;
 const END: u16 = 0x000a;
 const EXTENT: u16 = 0x0200;
-/// Records of a cell, which begin with its row and column; the last holds several.
+/// Types of records with a cell, which begin with its row and column; the last one holds several cells.
 const CELLS: [u16; 8] = [0x0006, 0x0203, 0x0204, 0x0205, 0x00d6, 0x00fd, 0x027e, SEVERAL];
 const SEVERAL: u16 = 0x00bd;
-/// Rows and columns that a sheet of this kind can have.
+/// Largest number of rows and columns in a sheet of this kind.
 const ROWS: u32 = 1 << 16;
 const COLUMNS: u32 = 1 << 8;
 
@@ -40,7 +40,7 @@ fn check_sheet(sheet: &[u8], budget: &mut Budget) -> Result<(), TooMuch> {
             BEGIN => depth += 1,
             END if depth <= 1 => break,
             END => depth -= 1,
-            // Charts within a sheet have cells of their own.
+            // Charts within a sheet have their own cells.
             _ if depth > 1 => {}
             EXTENT => check_extent(&record)?,
             kind if CELLS.contains(&kind) => {
@@ -85,14 +85,14 @@ fn check_extent(record: &Record) -> Result<(), TooMuch> {
     ))
 }
 
-/// A record: a type, a length, so many bytes.
+/// A record: a type, a length, and that many bytes.
 struct Record<'a> {
     kind: u16,
     data: &'a [u8],
 }
 
 impl<'a> Record<'a> {
-    /// The records of a stream, up to its end or to one that is cut.
+    /// Returns the records of a stream, up to its end or to a truncated one.
     fn all(stream: &'a [u8]) -> impl Iterator<Item = Self> {
         let mut rest = stream;
         std::iter::from_fn(move || {

@@ -1,5 +1,5 @@
-//! Inspection of a zip container before anything in it is read: the kind of workbook, and its unpacked size. Rows
-//! and cells of ODS with repetition counts are counted that many times.
+//! Inspection of a zip container before anything in it is read: the kind of workbook, and its unpacked size. Repeated
+//! rows and cells of ODS are counted as often as they are repeated.
 
 use std::io::{BufRead, BufReader, Cursor, Read, copy, sink};
 
@@ -18,7 +18,7 @@ pub(crate) enum Kind {
     Ods,
 }
 
-/// True if a container is no workbook, but an archive of files.
+/// True if a container is an archive of files rather than a workbook.
 pub(crate) fn is_archive(bytes: &[u8]) -> bool {
     const OF_WORKBOOKS: [&str; 3] = ["content.xml", "xl/workbook.bin", "[Content_Types].xml"];
     let Ok(archive) = ZipArchive::new(Cursor::new(bytes)) else { return false };
@@ -29,7 +29,7 @@ fn has(archive: &ZipArchive<Cursor<&[u8]>>, name: &str) -> bool {
     archive.file_names().flatten().any(|file| file.eq_ignore_ascii_case(name))
 }
 
-/// The kind of a workbook that unpacks to no more than it may.
+/// Returns the kind of a workbook whose unpacked size is within its bound.
 pub(crate) fn kind(bytes: &[u8]) -> Result<Kind, String> {
     check_unpacked(bytes, "save the sheet with the recording as CSV")?;
     let archive = ZipArchive::new(Cursor::new(bytes)).map_err(|error| error.to_string())?;
@@ -40,12 +40,12 @@ pub(crate) fn kind(bytes: &[u8]) -> Result<Kind, String> {
     })
 }
 
-/// Refuses a container that unpacks to more than it may.
+/// Refuses a container whose unpacked size exceeds its bound.
 pub(crate) fn check_unpacked(bytes: &[u8], way_out: &str) -> Result<(), String> {
     let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|error| error.to_string())?;
     let mut left = LARGEST_WORKBOOK;
     for index in 0..archive.len() {
-        // What the container says of sizes need not be true.
+        // The sizes that the container states may be wrong.
         let file = archive.by_index(index).map_err(|error| error.to_string())?;
         let size = copy(&mut file.take(left + 1), &mut sink()).map_err(|error| error.to_string())?;
         left = left.checked_sub(size).ok_or_else(|| {
@@ -56,17 +56,17 @@ pub(crate) fn check_unpacked(bytes: &[u8], way_out: &str) -> Result<(), String> 
     Ok(())
 }
 
-/// Refuses a workbook whose sheets have more cells than may be held, from the first to the last one that is not empty.
+/// Refuses a workbook whose sheets have too many cells, from the first to the last one that is not empty.
 pub(crate) fn check_ods(bytes: &[u8]) -> Result<(), TooMuch> {
     let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|error| error.to_string())?;
     let content = archive.by_name("content.xml").map_err(|error| error.to_string())?;
     count(BufReader::new(content))
 }
 
-/// Rows and columns of a sheet up to its last cell that is not empty, and the text in it.
+/// Rows and columns of a sheet up to its last cell that is not empty, and the size of their text.
 #[derive(Default)]
 struct Size {
-    /// Rows so far, and those up to the last that is not empty.
+    /// Number of rows so far, and of those up to the last that is not empty.
     rows: usize,
     height: usize,
     width: usize,
@@ -75,15 +75,15 @@ struct Size {
     last: (u32, u32),
 }
 
-/// A row that has begun.
+/// The row being read.
 #[derive(Default)]
 struct OpenRow {
     repeats: usize,
     columns: usize,
-    /// Columns up to the last cell that is not empty.
+    /// Number of columns up to the last cell that is not empty.
     width: usize,
     bytes: u64,
-    /// Repetitions of the cell that has begun.
+    /// Repetitions of the cell being read.
     cell: usize,
 }
 

@@ -20,7 +20,7 @@ pub(crate) fn clock(
         let place = find(found, role, wanted)?;
         return channel(found, answers, Taken { role, place }, remarks).map(Clock::Column);
     }
-    // The readings' time is the reference's too if both stand in one file.
+    // The readings' time is also the reference's if both are in one file.
     if role == Role::ReferenceTime
         && let Some(Some(wanted)) = answers.column(Role::Time)
         && let Ok(place) = find(found, role, wanted)
@@ -59,12 +59,12 @@ pub(crate) fn clock(
     if !is_named {
         remarks.push(format!("{}: {name} is taken for the time", table.file));
     }
-    // Unless it is another column, the reference's clock is under the name that the readings' has.
+    // Unless it is another column, the reference's clock has the role of the readings' clock.
     let role = if role == Role::ReferenceTime && times.len() == 1 { Role::Time } else { role };
     channel(found, answers, Taken { role, place: FileColumn { column, ..value } }, remarks).map(Clock::Column)
 }
 
-/// Leaves out clocks that do not tell rows apart, if there are others; what is to be remarked of that.
+/// Leaves out clocks that do not distinguish rows, if there are others, and returns a remark on that.
 fn without_coarse(found: &Found, times: &mut Vec<&Candidate>) -> Option<String> {
     let (coarse, fine): (Vec<&Candidate>, Vec<&Candidate>) =
         times.iter().partition(|time| found.is_coarse(time.place()));
@@ -75,7 +75,7 @@ fn without_coarse(found: &Found, times: &mut Vec<&Candidate>) -> Option<String> 
     Some(format!("{}: {name} is no clock: {rows} of {} rows have the time of the row before", table.file, table.len()))
 }
 
-/// The clock that the names lead to does not tell rows apart, and other columns increase.
+/// Returns the question for a clock that the names suggest but that does not distinguish rows, while other columns increase.
 fn too_coarse(found: &Found, place: FileColumn, role: Role, others: &[usize]) -> ImportError {
     let (table, repeated) = (found.table(place), found.facts(place).repeated);
     let mut answers = rising_answers(found, place.file, role, others);
@@ -86,7 +86,7 @@ fn too_coarse(found: &Found, place: FileColumn, role: Role, others: &[usize]) ->
     ImportError::question(&table.file, what, answers)
 }
 
-/// The time column beside a value, where every value has one on the same side: `t1, v1, t2, v2` or `v1, t1, v2, t2`.
+/// Returns the time column beside a value, if every value has one on the same side: `t1, v1, t2, v2` or `v1, t1, v2, t2`.
 fn beside(columns: usize, times: &[&Candidate], column: usize) -> Option<usize> {
     let is_time = |place: usize| times.iter().any(|time| time.column == place);
     let alternate =
@@ -110,7 +110,7 @@ fn no_time(found: &Found, file: usize, role: Role) -> ImportError {
     ImportError::question(&table.file, what, answers)
 }
 
-/// Answers that name each of these columns.
+/// Returns answers that name each of these columns.
 fn rising_answers(found: &Found, file: usize, role: Role, columns: &[usize]) -> Vec<String> {
     let answer = |column: &usize| {
         let column = refer(found.tables, FileColumn { file, column: *column });

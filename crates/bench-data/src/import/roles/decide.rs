@@ -12,8 +12,8 @@ use crate::import::table::{SEPARATOR, Table, all_files};
 use crate::import::words::units::scale_of_a_reference;
 use crate::import::words::{Role, names};
 
-/// Decides what files are imported as, by names, units and numbers, where the answers leave it open. The same findings and
-/// answers lead to the same decision.
+/// Decides by names, units and numbers how files are imported, where the answers leave it open. The same findings and answers lead to the
+/// same decision.
 pub(crate) fn decide(found: &Found, answers: &Recipe) -> Decision {
     let mut remarks = Vec::new();
     let mut questions: Vec<ImportError> = open_decimal(found.tables).into_iter().collect();
@@ -36,7 +36,7 @@ pub(crate) fn decide(found: &Found, answers: &Recipe) -> Decision {
         let found = temperature(found, answers, readings.values.place.file, &mut remarks);
         known(found, &mut questions).flatten()
     });
-    // What two columns, or two roles of one, share is said once.
+    // A remark that two columns, or two roles of one, have in common is made once.
     let mut said = BTreeSet::new();
     remarks.retain(|remark: &String| said.insert(remark.clone()));
     let readings = readings.into_iter().collect();
@@ -58,7 +58,7 @@ fn known<T>(decided: Result<T, ImportError>, questions: &mut Vec<ImportError>) -
     None
 }
 
-/// A column of values with the clock of its rows, which may stand in another column for the reference.
+/// Returns a column of values with the clock of its rows, which may be another column for the reference.
 fn timed(
     found: &Found,
     answers: &Recipe,
@@ -70,7 +70,7 @@ fn timed(
     Ok(Timed { values: channel(found, answers, taken, remarks)?, clock })
 }
 
-/// Questions about what the columns that were taken need besides.
+/// Returns questions about further information that the chosen columns need.
 fn missing_answers(found: &Found, answers: &Recipe, decision: &Decision) -> Vec<ImportError> {
     let mut questions: Vec<ImportError> =
         decision.channels().iter().filter_map(|channel| incomplete_records(found, channel.place)).collect();
@@ -118,7 +118,7 @@ pub(crate) fn is_stretch_without_zero(found: &Found, answers: &Recipe, decision:
     !is_answered && decision.reference.iter().any(|reference| is_stretch(&reference.values))
 }
 
-/// Refuses a label that is not in every other record of its file: what the records are has not been understood.
+/// Refuses a label that is missing in half of the records or more: the structure of its file has not been understood.
 fn incomplete_records(found: &Found, place: FileColumn) -> Option<ImportError> {
     let table = found.table(place);
     let is_record = table.layout.separator == Some(SEPARATOR);
@@ -139,7 +139,7 @@ fn by_its_name(found: &Found, answers: &Recipe, reference: FileColumn, readings:
     (references > 1 && !is_answered).then_some(remark)
 }
 
-/// Returns a remark if no column is the reference, and the user has not said that there is none.
+/// Returns a remark if no column is the reference and the user has not stated that there is none.
 fn no_reference(found: &Found, answers: &Recipe) -> Option<String> {
     if Role::REFERENCES.iter().any(|role| answers.column(*role).is_some()) {
         return None;
@@ -160,7 +160,7 @@ fn no_reference(found: &Found, answers: &Recipe) -> Option<String> {
     ))
 }
 
-/// A column that is called as a reference is, but has the unit of something else: `Position (V)`.
+/// Returns a column with the name of a reference but the unit of another quantity: `Position (V)`.
 fn in_another_unit(found: &Found) -> Option<(Taken, Option<&'static str>)> {
     found.places().find_map(|place| {
         let column = found.column(place);
@@ -169,7 +169,7 @@ fn in_another_unit(found: &Found) -> Option<(Taken, Option<&'static str>)> {
     })
 }
 
-/// Point or comma?
+/// Returns the question whether the decimal mark is a point or a comma.
 fn open_decimal(tables: &[Table]) -> Option<ImportError> {
     let (index, table) = tables.iter().enumerate().find(|(_, table)| table.layout.decimal_is_open)?;
     let file = if tables.len() > 1 { format!("{}:", index + 1) } else { String::new() };
@@ -177,7 +177,7 @@ fn open_decimal(tables: &[Table]) -> Option<ImportError> {
     Some(ImportError::question(&table.file, what, [",", "."].map(|mark| format!("--decimal {file}{mark}"))))
 }
 
-/// A temperature counts if it stands in the readings' file.
+/// Returns the channel of the temperature, if it is in the readings' file.
 fn temperature(
     found: &Found,
     answers: &Recipe,

@@ -8,14 +8,14 @@ pub(crate) struct FileColumn {
     pub column: usize,
 }
 
-/// A column and what it is taken for.
+/// A column with its assigned role.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Taken {
     pub role: Role,
     pub place: FileColumn,
 }
 
-/// A column that numbers are taken from.
+/// A column from which numbers are read.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Channel {
     pub role: Role,
@@ -27,7 +27,7 @@ pub(crate) struct Channel {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Clock {
     Column(Channel),
-    /// Rows of a file follow each other at a rate, 1/s.
+    /// Rows of a file are evenly spaced at this rate, 1/s.
     Rate {
         file: usize,
         hz: f64,
@@ -65,27 +65,27 @@ pub(crate) struct Timed {
     pub clock: Clock,
 }
 
-/// Columns as they are imported, and open questions.
+/// Imported columns, and open questions.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Decision {
-    /// Channels of readings; a trace is made of the first. Another sensor or another recording is another entry.
+    /// Channels of readings; the first one becomes the trace. Another sensor or another recording is another entry.
     pub readings: Vec<Timed>,
     pub reference: Option<Timed>,
     pub temperature: Option<Channel>,
     /// Conclusions from names or numbers that no answer stated.
     pub remarks: Vec<String>,
-    /// Open questions, the most important one first; without any, there are readings.
+    /// Open questions, the most important one first; if there are none, there are readings.
     pub questions: Vec<ImportError>,
 }
 
 impl Decision {
-    /// True if readings and reference stand in the same rows with the same times.
+    /// True if readings and reference are in the same rows with the same times.
     pub(crate) fn is_one_clock(&self) -> bool {
         let Some(reference) = &self.reference else { return true };
         self.readings.iter().all(|readings| reference.clock.is(&readings.clock))
     }
 
-    /// The columns that something is taken from.
+    /// Returns the columns from which anything is read.
     pub(crate) fn channels(&self) -> Vec<Channel> {
         let mut all = Vec::new();
         for readings in &self.readings {

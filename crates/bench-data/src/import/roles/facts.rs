@@ -12,7 +12,7 @@ use crate::import::words::units::epoch_unit;
 use crate::import::words::{Role, is_missing, is_stamp, nanoseconds, ohms};
 use crate::order::median;
 
-/// Cells that tell what a column without a name is.
+/// Number of cells that determine the role of a column without a name.
 const FIRST_CELLS: usize = 5;
 
 /// Possible role of a column, by its name and unit.
@@ -43,7 +43,7 @@ pub(crate) struct Found<'a> {
     pub facts: Vec<Vec<OnceCell<Facts>>>,
     /// Possible roles of the columns.
     pub candidates: Vec<Candidate>,
-    /// A known layout that one of the files has.
+    /// Known layout of one of the files.
     pub preset: Option<Preset>,
 }
 
@@ -52,11 +52,11 @@ pub(crate) struct Found<'a> {
 pub(crate) struct Facts {
     pub dates: Dates,
     pub numbers: Numbers,
-    /// The first cell that has a unit of its own.
+    /// First cell with a unit of its own.
     pub prefixed: Option<String>,
-    /// Empty cells, and the line of the first.
+    /// Number of empty cells, and the line of the first.
     pub empty: (usize, u64),
-    /// Rows in which the same stands as in the row before.
+    /// Number of rows with the same content as the previous row.
     pub repeated: usize,
 }
 
@@ -74,7 +74,7 @@ impl Facts {
     }
 }
 
-/// True if all cells are dates or times of day.
+/// Order of day, month and year, if all cells are dates or times of day.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) enum Dates {
     #[default]
@@ -91,11 +91,11 @@ pub(crate) struct Numbers {
     pub step: f64,
     pub has_fractions: bool,
     pub median: f64,
-    /// Median and largest of the sizes, without signs.
+    /// Median and largest absolute value.
     pub size: f64,
     pub largest: f64,
     pub least: f64,
-    /// They increase from row to row, all but a few.
+    /// True if they increase from row to row, with few exceptions.
     pub rise: bool,
 }
 
@@ -127,7 +127,7 @@ impl Dates {
             [] => Self::None,
             [order @ Order::Iso, ..] | [order] => Self::In(order),
             _ if filled().all(has_points) => Self::In(Order::Dmy),
-            // On one day it does not matter which number is the month.
+            // If all dates are the same, the order of day and month does not matter.
             _ if filled().all(|cell| day(cell) == filled().next().and_then(day)) => Self::In(Order::Dmy),
             _ => Self::Open,
         }
@@ -163,37 +163,37 @@ impl<'a> Found<'a> {
         self.table(place).name(place.column)
     }
 
-    /// All columns of all files.
+    /// Returns all columns of all files.
     pub(crate) fn places(&self) -> impl Iterator<Item = FileColumn> {
         let files = self.tables.iter().enumerate();
         files.flat_map(|(file, table)| (0..table.columns.len()).map(move |column| FileColumn { file, column }))
     }
 
-    /// True if a column of times does not tell rows apart.
+    /// True if a column of times does not distinguish rows.
     pub(crate) fn is_coarse(&self, place: FileColumn) -> bool {
         is_coarse(self.facts(place).repeated, self.table(place).len())
     }
 
-    /// Columns of a file whose numbers increase from row to row.
+    /// Returns columns of a file whose numbers increase from row to row.
     pub(crate) fn rising(&self, file: usize) -> Vec<usize> {
         let rises = |column: &usize| self.facts(FileColumn { file, column: *column }).numbers.rise;
         (0..self.facts[file].len()).filter(rises).collect()
     }
 }
 
-/// True if so many of all rows have the time of the row before that a clock does not tell rows apart.
+/// True if so many rows repeat the time of the previous row that a clock does not distinguish rows.
 pub(crate) const fn is_coarse(repeated: usize, rows: usize) -> bool {
     repeated * 5 > rows
 }
 
-/// Possible roles of the columns of files.
+/// Returns possible roles of the columns of files.
 #[must_use]
 pub fn candidates(tables: &[Table]) -> Vec<Candidate> {
     let says = |table: &Table| (0..table.columns.len()).map(|column| says(table, column)).collect::<Vec<_>>();
     tables.iter().enumerate().flat_map(|(file, table)| among(file, &says(table))).collect()
 }
 
-/// Returns the candidates in a file, by its columns' names and units. `R_1` beside `R` is another thing.
+/// Returns the candidates in a file, by its columns' names and units. `R_1` beside `R` is another quantity.
 pub(crate) fn among(table: usize, says: &[Option<(Role, Sureness)>]) -> Vec<Candidate> {
     let is_strong = |role: Role| says.contains(&Some((role, Sureness::Strong)));
     let said = says.iter().enumerate().filter_map(|(column, said)| said.map(|(role, how)| (column, role, how)));
@@ -202,8 +202,8 @@ pub(crate) fn among(table: usize, says: &[Option<(Role, Sureness)>]) -> Vec<Cand
         .collect()
 }
 
-/// Returns the role that a column's name and unit suggest, if it has a number or a date at all; a column of dates beside one of times of
-/// day has none. Without a name, times since 1970 and moments are the time.
+/// Returns the role that a column's name and unit suggest, if it has any number or date. A column of dates beside one of times of day has
+/// none. Without a name, times since 1970 and moments are the time.
 fn says(table: &Table, place: usize) -> Option<(Role, Sureness)> {
     let (column, decimal) = (&table.columns[place], table.layout.decimal);
     let mut filled = column.cells.iter().filter(|cell| !cell.is_empty()).take(FIRST_CELLS).peekable();

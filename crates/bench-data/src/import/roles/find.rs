@@ -5,12 +5,12 @@ use crate::import::roles::recipe::{ColumnName, NO_COLUMN, Recipe};
 use crate::import::table::Table;
 use crate::import::words::{Role, names};
 
-/// Stands before a number that is no name, where there are columns called by numbers.
+/// Prefix of a column number, for files whose columns have numbers as names.
 const COUNTED: char = '#';
-/// Columns that a question names.
+/// Largest number of columns that a question lists.
 const MOST_NAMED: usize = 6;
 
-/// The column that an answer names.
+/// Returns the column that an answer names.
 pub(crate) fn find(found: &Found, role: Role, wanted: &ColumnName) -> Result<FileColumn, ImportError> {
     let all = || found.places().filter(|place| wanted.file.is_none_or(|file| file == place.file + 1));
     let text = wanted.column.trim();
@@ -25,7 +25,7 @@ pub(crate) fn find(found: &Found, role: Role, wanted: &ColumnName) -> Result<Fil
             _ => number == Some(place.column + 1),
         }
     };
-    // A name before a number, so that a column may be called `3`.
+    // Names take precedence over numbers, so that a column may be called `3`.
     for way in 0..4 {
         let fitting: Vec<Taken> =
             all().filter(|place| !text.is_empty() && fits(way, *place)).map(|place| Taken { role, place }).collect();
@@ -41,7 +41,7 @@ pub(crate) fn find(found: &Found, role: Role, wanted: &ColumnName) -> Result<Fil
     Err(ImportError::question(&file, expected, [format!("--column {role}=NAME with one of them")]))
 }
 
-/// Several columns might be what they are named.
+/// Returns the question for several columns that fit a role.
 pub(crate) fn several(found: &Found, what: &str, taken: &[Taken]) -> ImportError {
     let others = taken.len().saturating_sub(MOST_NAMED);
     let named = &taken[..taken.len() - others];
@@ -58,7 +58,7 @@ pub(crate) fn several(found: &Found, what: &str, taken: &[Taken]) -> ImportError
     ImportError::question(&files.join(", "), format!("{} may be {what}", names.join(" and ")), answers)
 }
 
-/// The shortest sure way to name a column: its heading if that is the only one and can be typed, its number otherwise.
+/// Returns the shortest unambiguous name of a column: its heading if that is unique and can be typed, its number otherwise.
 pub(crate) fn refer(tables: &[Table], place: FileColumn) -> ColumnName {
     let columns = &tables[place.file].columns;
     let heading = &columns[place.column].heading;
@@ -79,7 +79,7 @@ pub(crate) fn refer(tables: &[Table], place: FileColumn) -> ColumnName {
     ColumnName { file, column }
 }
 
-/// The one of several columns whose name has the same stem as another column's: `Thumb angle` beside `Thumb`.
+/// Returns the only one of several columns whose name has the same stem as another column's: `Thumb angle` beside `Thumb`.
 fn paired(found: &Found, taken: &[Taken], beside: FileColumn) -> Option<Taken> {
     let stem = |place: FileColumn| names::stem(&found.column(place).name);
     let wanted = stem(beside);
@@ -87,7 +87,8 @@ fn paired(found: &Found, taken: &[Taken], beside: FileColumn) -> Option<Taken> {
     fitting.next().copied().filter(|_| fitting.next().is_none())
 }
 
-/// The column that an answer, or else a name, gives to one of several roles; `beside` is one with which it may share its name.
+/// Returns the column that an answer, or else a name, assigns to one of several roles; `beside` is a column with which it may share its
+/// name.
 pub(crate) fn choose(
     found: &Found,
     answers: &Recipe,
@@ -108,7 +109,7 @@ pub(crate) fn choose(
         let wanted = found.candidates.iter().filter(|one| one.is_named == by_name && is_wanted(one.role));
         wanted.map(|one| Taken { role: one.role, place: one.place() }).filter(|taken| !is_taken(taken)).collect()
     };
-    // A unit alone names nothing, but beside a column of the same stem: `index_deg` of `index_adc`.
+    // A unit alone does not determine a role, except beside a column of the same stem: `index_deg` of `index_adc`.
     let of_unit = || beside.and_then(|beside| paired(found, &fitting(false), beside));
     let named = fitting(true);
     match named[..] {

@@ -25,7 +25,7 @@ impl Preset {
         }
     }
 
-    /// The preset, if there is one, that a table without names looks like.
+    /// Returns the preset, if any, whose layout a table without names matches.
     #[must_use]
     pub fn that_fits(table: &Table) -> Option<Self> {
         let rises = |column: usize| table.increases(column);
@@ -37,7 +37,7 @@ impl Preset {
         fits.then_some(Self::ElectromechStretcher)
     }
 
-    /// Roles of its columns, counted from 1, and their units.
+    /// Returns the roles of its columns, counted from 1, and their units.
     pub(crate) const fn columns(self) -> [(Role, usize, &'static str); 4] {
         match self {
             Self::ElectromechStretcher => [
@@ -49,7 +49,7 @@ impl Preset {
         }
     }
 
-    /// Length of its sensors, mm.
+    /// Returns the length of its sensors, mm.
     pub(crate) const fn gauge_length_mm(self) -> f64 {
         match self {
             Self::ElectromechStretcher => 40.0,

@@ -6,7 +6,7 @@ use crate::import::table::{ReadOptions, RowFilter};
 use crate::import::words::{DecimalMark, Role};
 use crate::{FrontEndSpec, JointSpec};
 
-/// A flag's value that cannot be understood.
+/// A flag's value that is not valid.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct RecipeError(String);
@@ -21,7 +21,7 @@ pub struct ColumnName {
 }
 
 impl ColumnName {
-    /// True if no column is to be taken.
+    /// True if no column is to be used.
     #[must_use]
     pub fn is_none(&self) -> bool {
         self.file.is_none() && self.column == NO_COLUMN
@@ -52,7 +52,7 @@ impl FromStr for ColumnName {
     }
 }
 
-/// `2:rest` taken apart; files are counted from 1.
+/// Splits `2:rest` into its parts; files are counted from 1.
 fn file_and_rest(text: &str) -> (Option<usize>, &str) {
     match text.split_once(':') {
         Some((file, rest)) if file.len() <= 2 => match file.parse() {
@@ -66,14 +66,14 @@ fn file_and_rest(text: &str) -> (Option<usize>, &str) {
 /// A value for all files, or for one of them: `;` or `2:,`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PerFile<T> {
-    /// The file, counted from 1, if it is for one.
+    /// The file, counted from 1, if the value applies to one only.
     pub file: Option<usize>,
     /// The value.
     pub value: T,
 }
 
 impl<T> PerFile<T> {
-    /// True if it is for a file, counted from 0.
+    /// True if it applies to a file, counted from 0.
     fn is_for(&self, file: usize) -> bool {
         self.file.is_none_or(|named| named == file + 1)
     }
@@ -95,11 +95,11 @@ where
 /// Alignment of the reference's clock with that of the readings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Align {
-    /// They are one clock.
+    /// Both are one clock.
     None,
-    /// Alignment by the motion, which both files show.
+    /// Alignment by the motion, which both files contain.
     Motion,
-    /// The reference's clock plus so many seconds is the readings'.
+    /// Offset, s, added to the reference's clock.
     Seconds(f64),
 }
 
@@ -126,7 +126,7 @@ impl FromStr for Align {
     }
 }
 
-/// Answers about files that are given in advance; the others are found out or asked.
+/// Answers about files that are given in advance; others are inferred or asked for.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Recipe {
     /// A known layout.
@@ -137,11 +137,11 @@ pub struct Recipe {
     pub units: Vec<(Role, String)>,
     /// Decimal marks.
     pub decimal: Vec<PerFile<DecimalMark>>,
-    /// Lines above header and data.
+    /// Number of lines above header and data.
     pub skip: Vec<PerFile<usize>>,
     /// The sheet of a workbook.
     pub sheet: Option<String>,
-    /// Rows that are wanted: those that pass all of these.
+    /// Filters of rows; a row must pass all of them.
     pub rows: Vec<PerFile<RowFilter>>,
     /// Recording, counted from 1, of a file in which the clock restarts.
     pub recording: Option<usize>,
@@ -149,15 +149,15 @@ pub struct Recipe {
     pub missing: Vec<String>,
     /// Roles whose sign is arbitrary.
     pub magnitude: Vec<Role>,
-    /// Roles in which a lone 0 between larger values is a missing one.
+    /// Roles in which a lone 0 between larger values is a missing value.
     pub drop_zeros: Vec<Role>,
     /// Values of columns at rest, in their own units.
     pub zero: Vec<(Role, f64)>,
-    /// Neighbouring readings were taken with the current's sign changed: their means are the readings.
+    /// True if neighbouring readings were taken with opposite currents; their means are the readings.
     pub fold_polarity: bool,
     /// Alignment of two clocks.
     pub align: Option<Align>,
-    /// Rows per second where there is no time.
+    /// Rows per second, if there is no time.
     pub rate_hz: Option<f64>,
     /// Length of the unstretched sensor, mm.
     pub gauge_length_mm: Option<f64>,
@@ -199,7 +199,7 @@ impl Recipe {
         out
     }
 
-    /// Returns the column that was given for a role; `Some(None)` if there is to be none.
+    /// Returns the column given for a role; `Some(None)` if there is none by request.
     pub(crate) fn column(&self, role: Role) -> Option<Option<&ColumnName>> {
         let (_, name) = self.columns.iter().rev().find(|(of, _)| *of == role)?;
         Some(Some(name).filter(|name| !name.is_none()))
@@ -209,7 +209,7 @@ impl Recipe {
         self.units.iter().rev().find(|(of, _)| *of == role).map(|(_, unit)| unit.as_str())
     }
 
-    /// Returns the flags for it, each as one word of a command line, unquoted.
+    /// Returns the flags of the recipe, each as one word of a command line, unquoted.
     #[must_use]
     pub fn arguments(&self) -> Vec<String> {
         let mut out = Vec::new();

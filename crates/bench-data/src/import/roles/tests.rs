@@ -9,8 +9,8 @@ use crate::import::table::{Column, Table};
 use crate::import::words::names;
 use crate::import::words::stamp::Order;
 
-/// Columns, with what was found in them; an answer; the decision: role, column, unit, and how remarks (!) and questions (?)
-/// begin. Two bars stand between files.
+/// Columns with their findings; an answer; the decision: role, column, unit, and the beginnings of remarks (!) and questions (?). Two bars
+/// separate files.
 const TABLE: &str = "
 Time (s) | R (Ohm) | Strain (%) ;; time 1 s, resistance 2 ohm, strain 3 percent
 Time (s) | R (kOhm) | Strain (%) ; column strain=none ; time 1 s, resistance 2 kohm

@@ -9,14 +9,15 @@ use crate::import::words::names::doubtful_unit;
 use crate::import::words::stamp::Order;
 use crate::import::words::units::{self, Scale, Unit};
 
-/// Steps of times with fractions are taken for seconds up to this, s: slower than that, they may be milliseconds.
+/// Longest step, s, at which times with fractions count as seconds; with longer steps, they may be milliseconds.
 const LONGEST_STEP_S: f64 = 2.0;
-/// Shorter steps are no seconds: days, perhaps.
+/// Shortest step, s, at which times count as seconds; with shorter steps, they may be days.
 const SHORTEST_STEP_S: f64 = 1e-5;
-/// A resistance without a unit is taken for ohms from this on.
+/// Least median, Ω, at which a resistance without a unit counts as ohms.
 const LEAST_OHM: f64 = 10.0;
 
-/// Finds the channel of a column; its unit is found, or becomes a question. Conclusions from the numbers become remarks.
+/// Finds the channel of a column; its unit is inferred, or becomes a question. Conclusions from the numbers become
+/// remarks.
 pub(crate) fn channel(
     found: &Found,
     answers: &Recipe,
@@ -75,12 +76,12 @@ impl Asked<'_> {
         self.by_numbers(remarks)
     }
 
-    /// True if what stands in brackets behind the name of codes is where they come from: `analogRead(A0)`.
+    /// True if the brackets after the name of codes contain their pin: `analogRead(A0)`.
     fn is_pin(&self, unit: &str) -> bool {
         self.role == Role::Adc && !units::is_unit(unit)
     }
 
-    /// `R/R0 (%)` of more than half the resistance at rest may be that itself, or by how much it is more.
+    /// Refuses `R/R0 (%)` with a large median: it may be percent of the resistance at rest, or of its change.
     fn refuse_large_ratio(&self, unit: &str) -> Result<(), ImportError> {
         const LARGE: f64 = 50.0;
         let is_percent = units::unit(self.role, unit).is_some_and(|unit| unit.name == "change-percent");
@@ -109,7 +110,7 @@ impl Asked<'_> {
         units::unit(self.role, name)
     }
 
-    /// Dates and times of day.
+    /// Returns the unit of a column of dates or times of day.
     fn dates(&self) -> Result<Option<Unit>, ImportError> {
         match (self.facts)().dates {
             Dates::None => Ok(None),
@@ -121,7 +122,7 @@ impl Asked<'_> {
         }
     }
 
-    /// A unit that names or numbers leave no doubt of; otherwise a question.
+    /// Returns the unit if names or numbers leave no doubt; otherwise a question.
     fn by_numbers(&self, remarks: &mut Vec<String>) -> Result<Unit, ImportError> {
         let known = |name| units::unit(self.role, name);
         if let Some(end) = doubtful_unit(self.role, &self.column.heading) {
@@ -135,7 +136,7 @@ impl Asked<'_> {
         let numbers = &(self.facts)().numbers;
         let (unit, why) = match self.role {
             Role::Time | Role::ReferenceTime => {
-                // `millis` and `micros` name the unit.
+                // `millis` and `micros` state the unit.
                 let is_counted = |unit: &Unit| unit.scale != Scale::Stamp && self.column.name.len() > 1;
                 if let Some(unit) = known(&self.column.name).filter(is_counted) {
                     return Ok(unit);
@@ -147,7 +148,7 @@ impl Asked<'_> {
                 }
             }
             Role::Resistance => match &(self.facts)().prefixed {
-                // What has a unit in each cell has it there.
+                // Cells with units of their own determine it.
                 Some(cell) => (Some("ohm"), format!("cells such as {cell} have")),
                 None => ((numbers.size >= LEAST_OHM).then_some("ohm"), format!("about {:.0}", numbers.size)),
             },
@@ -170,14 +171,14 @@ impl Asked<'_> {
         Ok(unit)
     }
 
-    /// Units of numbers.
+    /// Returns the units that numbers of this role may have.
     fn numeric_units(&self) -> Vec<&'static str> {
         let mut names = units::names(self.role);
         names.retain(|name| units::unit(self.role, name).is_some_and(|unit| unit.scale != Scale::Stamp));
         names
     }
 
-    /// `R/R0` is a ratio; `dR/R0` is a change.
+    /// True for `dR/R0`, a change; false for `R/R0`, a ratio.
     fn is_change(&self) -> bool {
         is_change(&self.column.name)
     }
@@ -187,7 +188,7 @@ impl Asked<'_> {
     }
 }
 
-/// True if a column has lengths over that at rest: by its name, and numbers about one.
+/// True if a column contains lengths relative to that at rest: by its name, and by numbers around one.
 pub(crate) fn is_stretch_ratio(column: &Column, facts: &Facts) -> bool {
     const USUAL: std::ops::Range<f64> = 0.8..20.0;
     kinds::is_stretch_ratio(&column.name) && USUAL.contains(&facts.numbers.median) && facts.numbers.least > 0.0

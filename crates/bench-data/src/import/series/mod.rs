@@ -14,7 +14,7 @@ use digits::told_apart;
 pub(crate) use times::Times;
 pub(crate) use values::{Values, check_positive, converted};
 
-/// A gap of more typical steps is not bridged, unless the values on both sides are the same.
+/// Longest gap that is bridged, in typical steps, unless the values on both sides are equal.
 const LONGEST_GAP: f64 = 10.0;
 
 /// Answers for a clock that restarts.
@@ -26,11 +26,11 @@ const ANOTHER_RECORDING: [&str; 2] = [
 /// Values over strictly increasing times.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Series {
-    /// s.
+    /// Times, s.
     pub time: Vec<f64>,
-    /// NaN is a missing one.
+    /// Values; NaN is a missing one.
     pub value: Vec<f64>,
-    /// The table's row of each.
+    /// Row of each in the table.
     pub row: Vec<usize>,
 }
 
@@ -41,8 +41,8 @@ impl Series {
         self.row.push(row);
     }
 
-    /// A table's rows in the order of time, and how many are left out: those without a time, and those with the time of the
-    /// row before.
+    /// Takes a table's rows, whose times must not decrease, and counts the omitted ones: those without a time, and those with the time of
+    /// the previous row.
     pub(crate) fn ordered(table: &Table, time: &[f64], value: Vec<f64>) -> Result<(Self, usize, usize), ImportError> {
         let (mut series, mut untimed, mut repeated) = (Self::default(), 0, 0);
         for (row, (&time, value)) in time.iter().zip(value).enumerate() {
@@ -70,7 +70,7 @@ impl Series {
         Ok((series, untimed, repeated))
     }
 
-    /// The known values, interpolated by straight lines; NaN outside of them and in gaps.
+    /// Interpolates the known values linearly; NaN outside of them and in gaps.
     pub(crate) fn at(&self, times: &[f64]) -> Vec<f64> {
         let known: Vec<usize> = (0..self.time.len()).filter(|row| !self.value[*row].is_nan()).collect();
         let step = typical_step(&self.time).unwrap_or(0.0);
@@ -93,8 +93,8 @@ impl Series {
     }
 }
 
-/// Means of neighbours, in time and in value. The current flows one way in one and the other way in the other, so that
-/// what an offset of the electronics adds to the one it takes from the other.
+/// Returns the means of neighbours, in time and in value. Their currents are opposite, so that an offset of the electronics cancels in the
+/// mean.
 pub(crate) fn folded(series: &Series) -> Series {
     let mut out = Series::default();
     for row in 1..series.time.len() {
@@ -104,8 +104,8 @@ pub(crate) fn folded(series: &Series) -> Series {
     out
 }
 
-/// Rows with a lone 0 between values of one sign, to and from which the values jump farther than between almost all other
-/// neighbours; every 0 if a value cannot be zero.
+/// Returns rows with a lone 0 between values of one sign, if the jumps to both neighbours are larger than almost all others; every 0 if a
+/// value cannot be zero.
 pub(crate) fn spurious_zeros(values: &[f64], never_zero: bool) -> Vec<usize> {
     if never_zero {
         return (0..values.len()).filter(|row| values[*row] == 0.0).collect();
@@ -125,12 +125,12 @@ pub(crate) fn spurious_zeros(values: &[f64], never_zero: bool) -> Vec<usize> {
     (0..values.len()).filter(|row| values[*row] == 0.0).filter(is_spurious).collect()
 }
 
-/// Returns the amplitude by which neighbouring readings alternate, relative to their size, if they do: in most stretches of twenty,
-/// nearly every reading lies on the other side of its neighbours' mean than the one before. Noise does that in four of five.
+/// Returns the amplitude by which neighbouring readings alternate, relative to their size, if they do: in most stretches of twenty, nearly
+/// all readings alternate between above and below their neighbours' mean. In noise, about three of four do.
 pub(crate) fn alternation(values: &[f64]) -> Option<f64> {
     const STRETCH: usize = 20;
     const SHARE: f64 = 0.8;
-    // Of simulated white noise 1.3 % of the stretches are filled, two of two in 2e-4 of the recordings, three of four in 1e-5.
+    // Of simulated white noise, 1.3 % of the stretches qualify, two of two in 2e-4 of the recordings, three of four in 1e-5.
     const FEWEST: usize = 4;
     let known: Vec<f64> = values.iter().copied().filter(|value| !value.is_nan()).collect();
     let off = |i: usize| known[i] - 0.5 * (known[i - 1] + known[i + 1]);
@@ -173,7 +173,7 @@ mod tests {
         assert!([0, 4, 6].iter().all(|i| at[*i].is_nan()));
     }
 
-    /// A slow rise by 20 %, every other reading of it larger by 2 %.
+    /// Returns a slow rise by 20 %, with every other reading larger by 2 %.
     fn flipping(rows: u32) -> Vec<f64> {
         (0..rows).map(|k| (1.0 + 1e-3 * f64::from(k)) * if k % 2 == 0 { 1600.0 } else { 1632.0 }).collect()
     }

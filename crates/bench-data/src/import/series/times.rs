@@ -6,9 +6,9 @@ use crate::import::table::Table;
 use crate::import::words::stamp::{DAY, Order, past_midnight, stamp};
 use crate::import::words::{Scale, is_missing, nanoseconds};
 
-/// Times from here on, s, are no time since a recording began, but since 1970, or, in days, since the end of 1899.
+/// Least time, s, that is not counted from the start of a recording, but from 1970 or, in days, from the end of 1899.
 const DATES_FROM_S: f64 = 1e8;
-/// Days from the first of the calendar to these.
+/// Days from the start of the calendar to 1970 and to the end of 1899.
 const UNIX_DAY: i128 = 719_163;
 const SHEET_DAY: i128 = 693_594;
 /// Range of a 32-bit counter.
@@ -17,9 +17,9 @@ const WRAP: f64 = 4_294_967_296.0;
 /// Times of a table's rows.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Times {
-    /// s; NaN where missing. Dates, times of day and times since 1970 are counted from the first.
+    /// Times, s; NaN where missing. Dates, times of day and times since 1970 are counted from the first.
     pub seconds: Vec<f64>,
-    /// The first date or time of day, ns, and as it stands in the file.
+    /// The first date or time of day, ns, and its text in the file.
     pub zero: Option<(i128, String)>,
     /// Number of restarts of a 32-bit counter.
     pub wraps: usize,
@@ -48,7 +48,8 @@ fn counts(tables: &[Table], channel: &Channel, own_missing: &[String]) -> Result
         "us" => WRAP / 1e6,
         _ => return Ok(Times { seconds, ..Times::default() }),
     };
-    // As the trace's own `time_us`: a decrease that, modulo 2³², is less than half the range forward counts as one.
+    // Like the trace's own `time_us`: a decrease that, modulo 2³², is a step forward of less than half the range counts
+    // as a wrap.
     let unit_s = wrap_s / WRAP;
     let (mut wraps, mut last) = (0_u32, f64::NAN);
     for value in &mut seconds {
@@ -61,14 +62,14 @@ fn counts(tables: &[Table], channel: &Channel, own_missing: &[String]) -> Result
         }
         last = bare;
         if wraps > 0 {
-            // Counts are whole: their sum is exact, and divided once.
+            // Counts are whole numbers: their sum is exact, and divided once.
             *value = ((bare / unit_s).round() + f64::from(wraps) * WRAP) / (1.0 / unit_s).round();
         }
     }
     Ok(Times { seconds, wraps: wraps as usize, ..Times::default() })
 }
 
-/// Times since the first of them, in row `first`: to the digits that the file has, where its unit is a power of ten.
+/// Returns times since the first of them, in row `first`, with the file's digits if its unit is a power of ten.
 fn since_the_first(tables: &[Table], channel: &Channel, mut seconds: Vec<f64>, first: usize) -> Times {
     let table = &tables[channel.place.file];
     let cells = &table.columns[channel.place.column].cells;

@@ -6,12 +6,12 @@ use crate::import::table::Table;
 use crate::import::table::value_of;
 use crate::import::words::{DecimalMark, Role, Scale, Value, number, ohms};
 
-/// Numbers of a column in the trace's unit, and what stood where there are none.
+/// Numbers of a column in the trace's unit, and the texts of missing ones.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Values {
-    /// NaN is a missing one.
+    /// Values; NaN is a missing one.
     pub values: Vec<f64>,
-    /// Texts of missing values and how often they stand there, the commonest first.
+    /// Texts of missing values with their counts, the commonest first.
     pub missing: Vec<(String, usize)>,
 }
 
@@ -40,7 +40,7 @@ impl Values {
     }
 }
 
-/// A number of a column in the trace's unit.
+/// Converts a number of a column to the trace's unit.
 pub(crate) fn converted(value: f64, scale: Scale) -> f64 {
     in_trace_unit(number(&value.to_string(), DecimalMark::Point, scale.shift()).unwrap_or(value), scale)
 }
@@ -49,14 +49,14 @@ fn in_trace_unit(number: f64, scale: Scale) -> f64 {
     match scale {
         Scale::Affine(factor, offset) => number * factor + offset,
         Scale::ChangeShift(_) => 1.0 + number,
-        // No conductance is no resistance that can be written, and is asked about as zeros are.
+        // A conductance of zero has no finite resistance; it becomes 0, about which the user is asked.
         Scale::Inverse(_) if number == 0.0 => 0.0,
         Scale::Inverse(_) => number.recip(),
         Scale::Shift(_) | Scale::Stamp => number,
     }
 }
 
-/// A number of ohms with a unit of its own.
+/// Reads ohms with a unit in the cell.
 fn ohms_of(table: &Table, channel: &Channel, row: usize) -> Result<f64, ImportError> {
     let (cell, name) = (table.columns[channel.place.column].cells.get(row), table.name(channel.place.column));
     let found = ohms(cell.trim(), table.layout.decimal).filter(|_| channel.role == Role::Resistance);
@@ -74,7 +74,7 @@ fn ohms_of(table: &Table, channel: &Channel, row: usize) -> Result<f64, ImportEr
     Ok(found)
 }
 
-/// A text among numbers: is it a missing value?
+/// Returns the question whether a text among numbers is a missing value.
 fn no_number(table: &Table, name: &str, row: usize, cell: &str) -> ImportError {
     let line = table.lines[row];
     let what = format!("column {name}: expected a number, found {}", quote(cell));
@@ -85,7 +85,7 @@ fn no_number(table: &Table, name: &str, row: usize, cell: &str) -> ImportError {
     ImportError::question(&format!("{}:{line}", table.file), what, [answer])
 }
 
-/// Refuses values that are no resistance, and names the flag for their kind.
+/// Refuses values that are not resistances, and names the flag for their kind.
 pub(crate) fn check_positive(tables: &[Table], channel: &Channel, values: &[f64]) -> Result<(), ImportError> {
     let Some(row) = values.iter().position(|value| *value <= 0.0) else { return Ok(()) };
     let (table, column, role) = (&tables[channel.place.file], channel.place.column, channel.role);

@@ -6,7 +6,7 @@ use crate::import::table::select::RowFilter;
 use crate::import::table::value::number_of;
 use crate::import::words::{DecimalMark, names};
 
-/// A column as the file has it.
+/// A column as in the file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Column {
     /// Its name without the unit; empty if it has none.
@@ -20,23 +20,23 @@ pub struct Column {
 }
 
 impl Column {
-    /// A column by its heading, and the unit that something else gives it.
+    /// Makes a column from its heading and a unit from another source.
     pub(crate) fn new(heading: String, unit: Option<String>, cells: Cells) -> Self {
         let (name, own) = names::take_apart(&heading);
         Self { name, heading, unit: unit.or(own), cells }
     }
 }
 
-/// Properties of a file that are given in advance; the others are found out.
+/// Properties of a file that are given in advance; others are inferred.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ReadOptions {
     /// The decimal mark.
     pub decimal: Option<DecimalMark>,
-    /// Lines above header and data.
+    /// Number of lines above header and data.
     pub skip: Option<usize>,
     /// The sheet of a workbook.
     pub sheet: Option<String>,
-    /// The rows that are wanted, those that pass all of these.
+    /// Filters of rows; a row must pass all of them.
     pub rows: Vec<RowFilter>,
 }
 
@@ -51,33 +51,33 @@ pub struct Layout {
     pub separator: Option<&'static str>,
     /// The decimal mark.
     pub decimal: DecimalMark,
-    /// The file decides between point and comma by thousands only: `1,234`.
+    /// True if the decimal mark is ambiguous because commas occur only as in `1,234`.
     pub decimal_is_open: bool,
-    /// Marks group thousands somewhere.
+    /// True if marks group thousands anywhere.
     pub has_groups: bool,
-    /// Lines passed over above header and data.
+    /// Number of lines skipped above header and data.
     pub skip: usize,
-    /// Header lines.
+    /// Number of header lines.
     pub header_lines: usize,
     /// True if a line of units follows the header.
     pub unit_line: bool,
-    /// Rows per second that a line above the data speaks of, and that line.
+    /// Rows per second according to a line above the data, and the number of that line.
     pub rate: Option<(f64, u64)>,
-    /// Rows and columns are exchanged: each line of the file is a column.
+    /// True if rows and columns are exchanged: each line of the file is a column.
     pub is_exchanged: bool,
-    /// Each line is a value, of several quantities in turn.
+    /// True if each line is a value, of several quantities in turn.
     pub values_in_turn: bool,
-    /// Names in the header, where they are more than the columns, or fewer: they are those of the first columns.
+    /// Number of names in the header, if it differs from that of columns; they belong to the first columns.
     pub given_names: Option<usize>,
-    /// Lines of text among or behind the data, and a last one that was cut, which are passed over.
+    /// Number of skipped lines: text among or after the data, and a truncated last line.
     pub text_lines: usize,
     /// The first of them, counted from 1.
     pub first_text_line: Option<u64>,
-    /// Rows with fewer cells than there are columns.
+    /// Number of rows with fewer cells than columns.
     pub short_lines: usize,
 }
 
-/// A file's cells by column, and how they were written.
+/// Cells of a file by column, with the file's format.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
     /// Name of the file in messages.
@@ -88,7 +88,7 @@ pub struct Table {
     pub metadata: Metadata,
     /// The columns.
     pub columns: Vec<Column>,
-    /// The physical line (or row) of each row, counted from 1.
+    /// The physical line (or row) of each row in the file, counted from 1.
     pub lines: Vec<u64>,
 }
 
@@ -113,13 +113,13 @@ impl Table {
         }
     }
 
-    /// The columns, for messages.
+    /// Lists the columns for messages.
     pub(crate) fn list(&self) -> String {
         let names: Vec<String> = (0..self.columns.len()).take(12).map(|column| self.name(column)).collect();
         names.join(", ") + if self.columns.len() > 12 { " …" } else { "" }
     }
 
-    /// True if the numbers of a column increase from row to row, all but a few.
+    /// True if the numbers of a column increase from row to row, with few exceptions.
     pub(crate) fn increases(&self, column: usize) -> bool {
         let cells = self.columns[column].cells.cells();
         let known: Vec<f64> = cells.filter_map(|cell| number_of(&cell, self.layout.decimal)).collect();
@@ -128,14 +128,14 @@ impl Table {
         known.len() * 10 > self.len() * 9 && steps > 0 && upward * 100 >= steps * 98
     }
 
-    /// True if any column has a name, the clock of a serial monitor aside.
+    /// True if any column has a name, apart from the clock of a serial monitor.
     #[must_use]
     pub fn has_names(&self) -> bool {
         self.columns.iter().any(|column| !column.heading.is_empty() && column.heading != MONITOR_CLOCK)
     }
 }
 
-/// The names of all files, for messages.
+/// Lists the names of all files for messages.
 pub(crate) fn all_files(tables: &[Table]) -> String {
     tables.iter().map(|table| table.file.as_str()).collect::<Vec<_>>().join(", ")
 }

@@ -3,14 +3,14 @@ use crate::import::table::grid::{Grid, SAMPLE};
 use crate::import::table::value::{is_number, value_of};
 use crate::import::words::{DecimalMark, Value, ohms};
 
-/// Parts of a line.
+/// Number of cells of each kind in a line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Shape {
-    /// Cells.
+    /// All cells.
     pub width: usize,
     /// Cells that are numbers, dates or times of day.
     pub numbers: usize,
-    /// Cells that are neither, nor a missing value.
+    /// Cells that are none of these and not missing values.
     pub texts: usize,
 }
 
@@ -26,14 +26,14 @@ impl Shape {
                 prefixed += usize::from(matches!(cell, Cell::Text(text) if ohms(text, decimal).is_some()));
             }
         }
-        // `time,10k,22k` are names of columns.
+        // In `time,10k,22k` they are names of columns.
         if shape.numbers > 0 {
             (shape.numbers, shape.texts) = (shape.numbers + prefixed, shape.texts - prefixed);
         }
         shape
     }
 
-    /// True if words stand where data has numbers: `Date;13.5.2024`, `Maximum;1600`.
+    /// True if words replace some numbers of the data: `Date;13.5.2024`, `Maximum;1600`.
     pub(crate) const fn is_worded(self, data: Self) -> bool {
         self.numbers < data.numbers && self.texts > data.texts
     }
@@ -42,14 +42,14 @@ impl Shape {
 /// Common properties of the lines of data.
 pub(crate) struct Data {
     pub shape: Shape,
-    /// Their last cells are empty: a separator at the end.
+    /// True if their last cells are empty: a separator at the end.
     pub ends_empty: bool,
-    /// Their first cells count them.
+    /// True if their first cells number them.
     pub is_numbered: bool,
 }
 
 impl Data {
-    /// The commonest number of cells in lines with a number, and the commonest shape of that width.
+    /// Finds the commonest number of cells in lines with a number, and the commonest shape of that width.
     pub(crate) fn find(grid: &Grid, decimal: DecimalMark, first: usize) -> Self {
         let rows =
             || (first..grid.len()).filter(|row| grid.comment(*row).is_none()).take(SAMPLE).map(|row| grid.cells(row));
@@ -79,7 +79,7 @@ impl Data {
         Self { shape, ends_empty, is_numbered }
     }
 
-    /// The first line of data at or below `first`.
+    /// Returns the first line of data at or below `first`.
     pub(crate) fn first_row(&self, grid: &Grid, decimal: DecimalMark, first: usize) -> Option<usize> {
         let is_comment = |row: usize| grid.comment(row).is_some();
         let shape = |row: usize| Shape::of(&grid.cells(row), decimal);
@@ -88,7 +88,7 @@ impl Data {
             !is_comment(*row) && shape.width == self.shape.width && shape.numbers > 0 && shape.numbers >= shape.texts
         };
         let found = (first..grid.len()).find(is_data)?;
-        // `Date;13.5.2024` above the names has a number, too.
+        // `Date;13.5.2024` above the names also has a number.
         let sure = (found..grid.len()).find(|row| is_data(row) && !shape(*row).is_worded(self.shape)).unwrap_or(found);
         let clocks = usize::from(grid.has_monitor_clock());
         let has_names = (found..sure).any(|row| !is_comment(row) && shape(row).numbers <= clocks);
@@ -99,7 +99,7 @@ impl Data {
         } else {
             found
         };
-        // Below the names a row may lack its last cells.
+        // The first row below the names may lack its last cells.
         let is_short = |row: &usize| {
             let shape = shape(*row);
             !is_comment(*row) && (2..self.shape.width).contains(&shape.width) && shape.texts == 0 && shape.numbers > 1

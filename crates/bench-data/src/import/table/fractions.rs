@@ -1,11 +1,11 @@
-//! Clocks in two columns: whole seconds, or a time of day, in one and what is behind their decimal mark in another.
+//! Clocks in two columns: whole seconds, or a time of day, in one and their decimals in another.
 
 use crate::import::bytes::Cells;
 use crate::import::table::columns::{Column, Table};
 use crate::import::words::stamp::SPLIT_SECONDS;
 use crate::import::words::{DecimalMark, is_stamp};
 
-/// Names of columns of fractions beside times of day, and the digits of a fraction; none where it is a share of a second.
+/// Names of columns of fractions beside times of day, and the digits of a fraction; `None` for a decimal fraction of a second.
 const FRACTIONS: [(&str, Option<usize>); 10] = [
     ("frac", None),
     ("subsec", None),
@@ -19,7 +19,7 @@ const FRACTIONS: [(&str, Option<usize>); 10] = [
     ("nsec", Some(9)),
 ];
 
-/// Puts the fractions of a second behind the whole ones, in the column of these.
+/// Appends the fractions of a second to the whole seconds, in the column of the latter.
 pub(crate) fn join(table: &mut Table) {
     let pairs: Vec<(usize, Joined)> =
         (0..table.columns.len()).filter_map(|whole| Some((whole, joined(table, whole)?))).collect();
@@ -29,7 +29,7 @@ pub(crate) fn join(table: &mut Table) {
     }
 }
 
-/// A clock and the column that the fractions come from.
+/// A clock joined with its fractions, and the column of these.
 struct Joined {
     fraction: usize,
     cells: Cells,
@@ -54,22 +54,22 @@ fn joined(table: &Table, whole: usize) -> Option<Joined> {
         }
         Some(Joined { fraction, cells: out, unit: (!is_day).then(|| "s".to_owned()) })
     });
-    // Two columns of fractions leave it open.
+    // With two columns of fractions the choice is ambiguous.
     let only = joined.next()?;
     joined.next().is_none().then_some(only)
 }
 
-/// The digits of fractions in a column beside times of day.
+/// Returns the digits of fractions in a column beside times of day.
 fn of_a_day(table: &Table, fraction: usize) -> Option<Option<usize>> {
     let heading = table.columns[fraction].heading.to_lowercase();
     let words = || heading.split(|c: char| !c.is_alphanumeric());
-    // `ms` and `us` are whole words.
+    // `ms` and `us` must be whole words.
     let is_called =
         |name: &str| words().any(|word| if name.len() == 2 { word == name } else { word.starts_with(name) });
     FRACTIONS.iter().find(|(name, _)| is_called(name)).map(|(_, digits)| *digits)
 }
 
-/// The digits of fractions in a column beside whole seconds: `stamp.secs`, `stamp.nsecs`.
+/// Returns the digits of fractions in a column beside whole seconds: `stamp.secs`, `stamp.nsecs`.
 fn of_seconds(table: &Table, whole: usize, fraction: usize) -> Option<usize> {
     let [whole, fraction] = [whole, fraction].map(|column| table.columns[column].heading.trim().to_lowercase());
     let is_pair = |(name, part, _): &&(&str, &str, usize)| match (whole.strip_suffix(name), fraction.strip_suffix(part))
@@ -80,14 +80,14 @@ fn of_seconds(table: &Table, whole: usize, fraction: usize) -> Option<usize> {
     SPLIT_SECONDS.iter().find(is_pair).map(|(_, _, digits)| *digits)
 }
 
-/// A moment with its fraction; `None` if the two cells are not of that kind.
+/// Returns a moment with its fraction; `None` if the two cells are not of that kind.
 fn cell(whole: &str, fraction: &str, digits: Option<usize>, decimal: DecimalMark, is_day: bool) -> Option<String> {
     let (whole, fraction) = (whole.trim(), fraction.trim());
     if whole.is_empty() || fraction.is_empty() {
         return Some(String::new());
     }
     let is_count = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
-    // Workbooks have microseconds, of which there are none.
+    // Workbooks add microseconds, here all zero.
     let seconds = whole.strip_suffix(".000000").unwrap_or(whole);
     let is_whole = if is_day { is_stamp(seconds) && !seconds.contains(['.', ',']) } else { is_count(seconds) };
     let part = match digits {

@@ -1,11 +1,11 @@
-//! Lines taken apart into cells.
+//! Lines split into cells.
 
 use std::borrow::Cow;
 
 use crate::import::bytes::{Cell, Rows};
 use crate::import::words::is_stamp;
 
-/// Lines looked at to find out how a file is written.
+/// Number of lines examined to determine the format of a file.
 pub(crate) const SAMPLE: usize = 1000;
 
 /// Text that a serial monitor puts between its clock and the line.
@@ -25,7 +25,7 @@ pub(crate) enum Separator {
 }
 
 impl Separator {
-    /// Separators between cells; if two explain a file alike, the first counts.
+    /// Separators between cells; if two fit a file equally well, the first one wins.
     pub(crate) const CELLS: [Self; 5] = [Self::Tab, Self::Semicolon, Self::Comma, Self::Pipe, Self::Spaces];
 
     pub(crate) const fn words(self) -> &'static str {
@@ -59,12 +59,12 @@ pub(crate) fn is_monitor<'a>(lines: impl Iterator<Item = &'a str>) -> bool {
     arrows * 10 > all * 8
 }
 
-/// The line behind the clock of a serial monitor.
+/// Returns the part of a line after the clock of a serial monitor.
 pub(crate) fn behind_arrow(line: &str) -> &str {
     line.split_once(ARROW).map_or(line, |(_, rest)| rest)
 }
 
-/// The cells of a line of text.
+/// Splits a line of text into cells.
 pub(crate) fn split(line: &str, separator: Separator) -> Vec<Cow<'_, str>> {
     let Some(byte) = separator.byte() else {
         return line.split([' ', '\u{a0}']).filter(|cell| !cell.is_empty()).map(|cell| unquoted(cell).into()).collect();
@@ -80,7 +80,7 @@ fn unquoted(cell: &str) -> &str {
     cell.strip_prefix('"').and_then(|cell| cell.strip_suffix('"')).unwrap_or(cell)
 }
 
-/// The cells of a line with quotation marks.
+/// Splits a line with quotation marks into cells.
 fn quoted(line: &str, byte: u8) -> Option<Vec<Cow<'static, str>>> {
     let mut reader = csv::ReaderBuilder::new()
         .delimiter(byte)
@@ -92,14 +92,14 @@ fn quoted(line: &str, byte: u8) -> Option<Vec<Cow<'static, str>>> {
     Some(record.iter().map(|cell| Cow::from(cell.trim().to_owned())).collect())
 }
 
-/// A file as lines of cells, however they are kept.
+/// A file as lines of cells, whatever its container.
 pub(crate) enum Grid<'a> {
     /// Lines of text with their numbers in the file.
     Text {
         lines: Vec<(u64, &'a str)>,
         separator: Separator,
         monitor: bool,
-        /// The last line has no end: it may have been cut.
+        /// True if the last line has no end and may have been truncated.
         is_open: bool,
     },
     /// Rows of a sheet, or records.
@@ -126,7 +126,7 @@ impl Grid<'_> {
         }
     }
 
-    /// The cells of a line.
+    /// Returns the cells of a line.
     pub(crate) fn cells(&self, row: usize) -> Cow<'_, [Cell<'_>]> {
         match self {
             Self::Rows(rows) => rows[row].1.as_slice().into(),
@@ -143,7 +143,7 @@ impl Grid<'_> {
         }
     }
 
-    /// The text of a comment line, without its mark.
+    /// Returns the text of a comment line, without its mark.
     pub(crate) fn comment(&self, row: usize) -> Option<&str> {
         match self {
             Self::Rows(_) => None,
@@ -151,7 +151,8 @@ impl Grid<'_> {
                 let line = lines[row].1.trim_start();
                 let mark = ["//", "#", "%"].into_iter().find(|mark| line.starts_with(mark))?;
                 let rest = &line[mark.len()..];
-                // `%;s;Ohm` is a line of units, `#,Time,R` one of names. A tab is a blank too: look before trimming.
+                // `%;s;Ohm` is a line of units, `#,Time,R` one of names. A tab is also a blank, so this is checked
+                // before trimming.
                 let is_cell =
                     separator.byte().is_some_and(|byte| rest.trim_start_matches(' ').as_bytes().first() == Some(&byte));
                 (!is_cell).then_some(rest.trim())

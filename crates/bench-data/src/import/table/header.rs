@@ -8,7 +8,7 @@ use crate::import::words::names::{self, Sureness};
 use crate::import::words::{DecimalMark, units};
 use crate::metadata::Metadata;
 
-/// Lines above the data that may belong to its header: two of names, one of units.
+/// Largest number of header lines above the data: two of names, one of units.
 const MOST_HEADER_LINES: usize = 3;
 
 /// Lines above the data.
@@ -18,13 +18,13 @@ pub(crate) struct Header {
     pub first_row: usize,
     /// Shape of most lines of data.
     pub shape: Shape,
-    /// Heading of each column; empty where there is none.
+    /// Heading of each column; empty if there is none.
     pub headings: Vec<String>,
-    /// Unit of each column, where a line of units has one.
+    /// Unit of each column, from a line of units.
     pub units: Vec<Option<String>>,
     /// Physical lines above the header, or above the data if there is none.
     pub skip: usize,
-    /// Lines of names.
+    /// Number of lines of names.
     pub header_lines: usize,
     /// True if there is a line of units.
     pub unit_line: bool,
@@ -59,14 +59,14 @@ impl Header {
         Ok(header)
     }
 
-    /// Labels are their own header.
+    /// Builds the header of records, whose labels are the headings.
     pub(crate) fn of_records(records: &Records, decimal: DecimalMark, skip: usize) -> Self {
         let headings = records.headings.clone();
         let shape = records.rows.get(records.fullest).map_or_else(Shape::default, |row| Shape::of(&row.1, decimal));
         Self { shape, units: vec![None; headings.len()], headings, skip, ..Self::default() }
     }
 
-    /// They count wherever they stand above the data, in lines that are skipped too.
+    /// Reads metadata anywhere above the data, including skipped lines.
     fn read_metadata(&mut self, file: &str, grid: &Grid) -> Result<(), ImportError> {
         for row in 0..self.first_row {
             if let Some(comment) = grid.comment(row).filter(|comment| comment.contains('=')) {
@@ -77,7 +77,8 @@ impl Header {
         Ok(())
     }
 
-    /// Takes names and units from the lines above the data; the topmost line taken, or the first of data.
+    /// Takes names and units from the lines above the data, and returns the topmost line taken, or the first line of
+    /// data.
     fn read_names(
         &mut self,
         file: &str,
@@ -97,7 +98,8 @@ impl Header {
             };
             let Some(cells) = cells else { break };
             lines.push((row, cells));
-            // Names that are more than the columns, or fewer, leave open what those above them belong to.
+            // If the number of names differs from that of columns, it is unclear to which columns the names above
+            // belong.
             if self.given_names.is_some() {
                 break;
             }
@@ -121,12 +123,13 @@ impl Header {
         let mut top = *row;
         if let Some((row, above)) = names.get(1) {
             if has_twins(nearest) {
-                // A line of groups above, `Sensor,Sensor,Stage,Stage`, tells columns of the same name apart.
+                // A line of groups above, `Sensor,Sensor,Stage,Stage`, distinguishes columns of the same name.
                 let join = |(group, name): (&String, &String)| format!("{group} {name}").trim().to_owned();
                 self.headings = filled_to_the_right(above).iter().zip(nearest).map(join).collect();
                 (self.header_lines, top) = (2, *row);
             } else if !has_twins(above) {
-                // `Time,Resistance` above `Channel 1,DMM`: each column has the name that says what is measured.
+                // `Time,Resistance` above `Channel 1,DMM`: each column takes the name that states the measured
+                // quantity.
                 for (heading, above) in self.headings.iter_mut().zip(above) {
                     if is_quantity(above) && !is_quantity(heading) {
                         heading.clone_from(above);
@@ -152,12 +155,12 @@ impl Header {
     }
 }
 
-/// True if all cells are units, empty ones aside, or short words beside at least one unit.
+/// True if all cells, apart from empty ones, are units, or short words beside at least as many units.
 fn is_unit_line(cells: &[String]) -> bool {
     let filled = || cells.iter().filter(|cell| !cell.is_empty());
     let units = filled().filter(|cell| units::is_unit(cell)).count();
     units > 0 && filled().all(|cell| cell.chars().count() <= 12) && 2 * units >= filled().count() && {
-        // `t`, `R`, `x` are names first: a line of units has none that names a quantity and is no unit.
+        // `t`, `R`, `x` are primarily names: in a line of units, a cell that names a quantity must also be a unit.
         filled().all(|cell| units::is_unit(cell) || names::role(cell, None).is_none())
     }
 }
@@ -177,7 +180,7 @@ fn has_twins(names: &[String]) -> bool {
     names.iter().enumerate().any(|(i, name)| names[..i].contains(name))
 }
 
-/// Groups of merged cells have their name in the first of them.
+/// Fills merged cells of groups, whose first cell has the name.
 fn filled_to_the_right(groups: &[String]) -> Vec<String> {
     let mut last = String::new();
     let filled = groups.iter().map(|group| {

@@ -1,15 +1,15 @@
-//! One value on each line, of several quantities in turn: what a board prints with a line for each of them.
+//! Values of several quantities in turn, one on each line, as a board prints with a separate call for each of them.
 
 use crate::import::bytes::{Cell, Rows};
 use crate::import::words::{DecimalMark, number};
 
-/// Quantities in turn, at most, and rows of each, at least.
+/// Largest number of quantities in turn, and least number of rows of each.
 const MOST_QUANTITIES: usize = 4;
 const FEWEST_ROWS: usize = 10;
-/// Ratio by which neighbours differ more than values of one quantity do from one to the next.
+/// Ratio of the differences between neighbours to those between successive values of one quantity.
 const APART: f64 = 5.0;
 
-/// The rows of lines that are a number each, of several quantities in turn; `None` if they are of one.
+/// Returns the rows of lines with a number each, of several quantities in turn; `None` if they are of one quantity.
 pub(crate) fn rows<'a>(lines: &[(u64, &'a str)], decimal: DecimalMark) -> Option<Rows<'a>> {
     let values: Vec<f64> = lines.iter().map(|(_, line)| number(line, decimal, 0)).collect::<Option<_>>()?;
     let width = (2..=MOST_QUANTITIES).find(|width| are_in_turn(&values, *width))?;
@@ -21,7 +21,7 @@ fn are_in_turn(values: &[f64], width: usize) -> bool {
     let typical = |apart: usize| {
         let mut steps: Vec<f64> = values.windows(apart + 1).map(|part| (part[apart] - part[0]).abs()).collect();
         steps.sort_by(f64::total_cmp);
-        // All but a few: every neighbour is of another quantity, and hardly any value jumps.
+        // With few exceptions, neighbours are of different quantities and no value jumps.
         (steps.get(steps.len() / 20).copied(), steps.get(steps.len() * 19 / 20).copied())
     };
     let ((Some(least), _), (_, Some(largest))) = (typical(1), typical(width)) else { return false };

@@ -1,13 +1,13 @@
-//! Recordings as JSON: an object or a list for each row, one below the other or in a list, or a list for each column.
+//! Recordings as JSON: an object or a list for each row, on separate lines or in a list, or a list for each column.
 
 use std::collections::HashMap;
 
 use crate::import::bytes::{Cell, Json, Rows, json_values};
 
-/// Columns of a recording; a file with more of them is something else.
+/// Largest number of columns; a file with more of them is not a recording.
 const MOST_COLUMNS: usize = 1000;
 
-/// The rows of a text that is JSON, under a line of names if there are any; `None` if it is none.
+/// Returns the rows of a JSON text, below a line of names if there are any; `None` if the text is not JSON.
 pub(crate) fn rows(text: &str) -> Option<Rows<'static>> {
     if !text.trim_start_matches(['\u{feff}', ' ', '\n', '\r', '\t']).starts_with(['{', '[']) {
         return None;
@@ -23,7 +23,7 @@ pub(crate) fn rows(text: &str) -> Option<Rows<'static>> {
     records(values)
 }
 
-/// A file that is one value.
+/// Returns the rows of a file that is a single value.
 fn whole(value: Json) -> Option<Rows<'static>> {
     match value {
         Json::List(list) if list.iter().all(|item| !matches!(item, Json::Cell(_))) => {
@@ -34,7 +34,8 @@ fn whole(value: Json) -> Option<Rows<'static>> {
     }
 }
 
-/// Columns by name, as lists or as objects by the number of the row; `columns` beside `data`; or something with these in it.
+/// Returns the rows of columns by name, as lists or as objects indexed by row number; of `columns` beside `data`; or of an object that
+/// contains one of these.
 fn of_object(pairs: Vec<(String, Json)>) -> Option<Rows<'static>> {
     let named = |wanted: &str| pairs.iter().find(|(name, _)| name == wanted).map(|(_, value)| value);
     if let (Some(Json::List(names)), Some(Json::List(data))) = (named("columns"), named("data")) {
@@ -57,11 +58,11 @@ fn of_object(pairs: Vec<(String, Json)>) -> Option<Rows<'static>> {
         let row = |row: usize| (row as u64 + 1, columns.iter().map(|(_, cells)| cells[row].clone()).collect());
         return Some([(1, names)].into_iter().chain((0..longest).map(row)).collect());
     }
-    // Settings beside the recording.
+    // The object may contain settings beside the recording.
     pairs.into_iter().find_map(|(_, value)| whole(value))
 }
 
-/// The cells of a column; none if it is something else.
+/// Returns the cells of a column; none if it is something else.
 fn list_of_cells(value: &Json) -> Vec<Cell<'static>> {
     let cell = |value: &Json| if let Json::Cell(cell) = value { Some(cell.clone()) } else { None };
     match value {
@@ -79,7 +80,7 @@ fn cells_of(row: &Json) -> Vec<Cell<'static>> {
     out.into_iter().map(|(_, cell)| cell).collect()
 }
 
-/// Rows of objects, whose names are the columns, or of lists.
+/// Returns the rows of objects, whose keys are the columns, or of lists.
 fn records(values: Vec<(u64, Option<Json>)>) -> Option<Rows<'static>> {
     let (mut names, mut places, mut rows) = (Vec::<String>::new(), HashMap::<String, usize>::new(), Rows::new());
     for (line, value) in values {
@@ -100,7 +101,7 @@ fn records(values: Vec<(u64, Option<Json>)>) -> Option<Rows<'static>> {
                 }
             }
             Some(value) => cells = cells_of(&value),
-            // What is no JSON is a line of something else.
+            // Anything that is not JSON is a line of text.
             None => cells.push(Cell::Text("no JSON".into())),
         }
         if names.len() > MOST_COLUMNS {
@@ -119,7 +120,7 @@ fn records(values: Vec<(u64, Option<Json>)>) -> Option<Rows<'static>> {
     Some(rows)
 }
 
-/// Names without what stands above them, where the last word alone is a name, and the only one of its kind.
+/// Shortens names to their last word, if that is a unique name of a quantity.
 fn shortened(names: &[String]) -> Vec<String> {
     let last = |name: &String| name.rsplit('.').next().unwrap_or_default().to_owned();
     let short = |name: &String| {
@@ -130,7 +131,7 @@ fn shortened(names: &[String]) -> Vec<String> {
     names.iter().map(short).collect()
 }
 
-/// The cells in a value, named by what stands above them: `stamp.sec`, `position.0`.
+/// Collects the cells in a value, named by their path: `stamp.sec`, `position.0`.
 fn flatten(name: String, value: &Json, out: &mut Vec<(String, Cell<'static>)>) {
     let below = |part: &str| if name.is_empty() { part.to_owned() } else { format!("{name}.{part}") };
     match value {

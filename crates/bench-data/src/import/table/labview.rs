@@ -1,16 +1,16 @@
-//! LabVIEW measurement files without a column of times: these follow from `X0` and `Delta_X` in the header of each segment.
+//! LabVIEW measurement files without a column of times, which follow from `X0` and `Delta_X` in the header of each segment.
 
 use crate::import::bytes::{Cell, Rows};
 use crate::import::words::{DecimalMark, number, units};
 
-/// Beginning of the first line, end of a header, and the first key of a segment's header.
+/// Start of the first line, end of a header, and the first key of a segment's header.
 const MAGIC: &str = "LabVIEW Measurement";
 const END: &str = "***End_of_Header***";
 const SEGMENT: &str = "Channels";
-/// Decimals of a time whose step is written with an exponent.
+/// Number of decimals of a time whose step is written with an exponent.
 const MOST_DECIMALS: usize = 12;
 
-/// The names and rows of such a file, each row behind its time, and its decimal mark; `None` if it is none.
+/// Returns the names and rows of such a file, each row after its time, and its decimal mark; `None` if the file is of another kind.
 pub(crate) fn rows<'a>(lines: &[(u64, &'a str)]) -> Option<(Rows<'a>, DecimalMark)> {
     let first = lines.first()?.1.trim_start_matches('\u{feff}').trim_start();
     let end = lines.iter().position(|(_, line)| line.starts_with(END)).filter(|_| first.starts_with(MAGIC))?;
@@ -34,7 +34,7 @@ pub(crate) fn rows<'a>(lines: &[(u64, &'a str)]) -> Option<(Rows<'a>, DecimalMar
             segment.take(&cells);
         } else if !has_names {
             has_names = true;
-            // The names of later segments are those of the first.
+            // Later segments have the names of the first.
             if out.is_empty() {
                 out.push((line, segment.names(&cells)));
             }
@@ -65,7 +65,7 @@ impl<'a> Segment<'a> {
         }
     }
 
-    /// The names of the columns, each with the unit that the header has for it.
+    /// Returns the names of the columns, each with its unit from the header.
     fn names(&self, cells: &[&'a str]) -> Vec<Cell<'a>> {
         let channel = |(place, name): (usize, &&'a str)| match self.units.get(place) {
             Some(unit) if units::is_unit(unit) && !name.ends_with(')') => Cell::Text(format!("{name} ({unit})").into()),
@@ -74,7 +74,7 @@ impl<'a> Segment<'a> {
         [Cell::text("Time (s)")].into_iter().chain(cells[1..].iter().enumerate().map(channel)).collect()
     }
 
-    /// Returns the next row behind its time; `None` if the header has no step between rows.
+    /// Returns the next row, after its time; `None` if the header has no step between rows.
     fn row(&mut self, cells: &[&'a str], decimal: DecimalMark) -> Option<Vec<Cell<'a>>> {
         let step = number(self.step, decimal, 0)?;
         let first = number(self.first, decimal, 0).unwrap_or(0.0);
@@ -91,7 +91,7 @@ impl<'a> Segment<'a> {
     }
 }
 
-/// Returns the value behind a key, whatever separates them.
+/// Returns the value after a key, whatever separates them.
 fn value<'a>(lines: &[(u64, &'a str)], key: &str) -> Option<&'a str> {
     let behind = lines.iter().find_map(|(_, line)| line.strip_prefix(key))?;
     behind.split(['\t', ',']).nth(1).map(str::trim)

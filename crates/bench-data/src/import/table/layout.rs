@@ -1,8 +1,8 @@
 use crate::import::table::grid::{SAMPLE, Separator, behind_arrow, split};
 use crate::import::words::{DecimalMark, Value, amount, is_stamp};
 
-/// Finds separator and decimal mark, those under which most cells are numbers and fewest are text; and whether only cells
-/// like `1,234` speak for the mark.
+/// Finds the separator and the decimal mark with which most cells are numbers and fewest are text. Also returns whether the mark is
+/// ambiguous because all evidence is of the form `1,234`.
 ///
 /// `monitor`: lines begin with the clock of a serial monitor.
 pub(crate) fn text_layout(
@@ -26,7 +26,7 @@ pub(crate) fn text_layout(
     (separator, mark, decimal.is_none() && mark_is_open(lines, separator, mark))
 }
 
-/// Counts numbers less texts, in lines of the best width. Numbers with marks of thousands count if `groups`.
+/// Counts numbers minus texts, in lines of the best width. Numbers with marks of thousands count if `groups`.
 fn score(lines: &[&str], separator: Separator, mark: DecimalMark, groups: bool) -> i64 {
     let mut by_width: Vec<(usize, i64)> = Vec::new();
     for line in lines {
@@ -53,16 +53,16 @@ fn kind(cell: &str, mark: DecimalMark, groups: bool) -> Value {
         return Value::Number(0.0);
     }
     match amount(cell, mark) {
-        // Unless the mark is known, the other one is taken for the mark, not for thousands.
+        // Unless the decimal mark is known, the other mark counts as a decimal mark, not as a thousands mark.
         Value::Number(_) if !groups && cell.contains(other) && !cell.contains(own) => Value::Text,
         kind => kind,
     }
 }
 
-/// True if every cell with a mark is as good with the other one: `1,234`, one to three digits before, three behind.
+/// True if every cell with a mark is also a number with the other one: `1,234`, one to three digits before, three after it.
 fn mark_is_open(lines: &[(u64, &str)], separator: Separator, mark: DecimalMark) -> bool {
     if mark == DecimalMark::Point {
-        // `1.234`: points group thousands in files with decimal commas only, and then some cell would have a comma.
+        // In `1.234`, points group thousands only if commas are decimal marks, and then some cell would have a comma.
         return false;
     }
     let mut some = false;

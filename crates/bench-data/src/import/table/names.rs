@@ -9,7 +9,7 @@ use crate::import::table::value::{number_of, value_of};
 use crate::import::words::names::{self, Sureness};
 use crate::import::words::{DecimalMark, Value, is_stamp};
 
-/// Rows that a line of numbers is compared with.
+/// Number of rows with which a line of numbers is compared.
 const ROWS_BELOW: usize = 20;
 
 /// A line of names, one for each column.
@@ -20,7 +20,7 @@ pub(crate) struct Names {
 }
 
 impl Data {
-    /// The names in the line above the first of data.
+    /// Returns the names in the line above the first line of data.
     pub(crate) fn names_above(&self, grid: &Grid, decimal: DecimalMark, data: usize) -> Option<Names> {
         let whole = |cells| Names { cells, given: None };
         self.heading_cells(grid, data.checked_sub(1)?)
@@ -30,7 +30,7 @@ impl Data {
             .or_else(|| self.some_names(grid, data))
     }
 
-    /// The cells of a line of names or units, as many as the data has columns; `None` if it is no such line.
+    /// Returns the cells of a line of names or units, as many as the data has columns; `None` if the line is of another kind.
     pub(crate) fn heading_cells(&self, grid: &Grid, row: usize) -> Option<Vec<String>> {
         let width = self.shape.width;
         let mut cells = cells_above(grid, row)?;
@@ -40,7 +40,7 @@ impl Data {
         while cells.len() > width && cells.last().is_some_and(String::is_empty) {
             cells.pop();
         }
-        // A name for remarks, of which there are none.
+        // The last one names a column of remarks that has no cells.
         if cells.len() == width + 1 && width > 1 && cells.last().is_some_and(|last| names::role(last, None).is_none()) {
             cells.pop();
         }
@@ -56,7 +56,7 @@ impl Data {
         Some(cells)
     }
 
-    /// Names of which all but some are numbers, `length,1,2,3`: words stand where the data has numbers, and no two are alike.
+    /// Returns names most of which are numbers, `length,1,2,3`: some cells are words where the data has numbers, and all are different.
     pub(crate) fn numbers_as_names(&self, grid: &Grid, decimal: DecimalMark, data: usize) -> Option<Vec<String>> {
         let above = data.checked_sub(1).filter(|above| grid.comment(*above).is_none())?;
         let (cells, below) = (grid.cells(above), grid.cells(data));
@@ -77,7 +77,7 @@ impl Data {
         is_fit.then_some(names)
     }
 
-    /// Names that count the columns, from 0 or 1, of which one at least is far from all that stands below it.
+    /// Returns names that number the columns, from 0 or 1, if at least one of them is far from all values below it.
     pub(crate) fn counted_names(&self, grid: &Grid, decimal: DecimalMark, data: usize) -> Option<Vec<String>> {
         let above = data.checked_sub(1).filter(|above| data < grid.len() && grid.comment(*above).is_none())?;
         let cells = grid.cells(above);
@@ -98,7 +98,7 @@ impl Data {
         (0..names.len()).any(|place| far(place) == Some(true)).then_some(names)
     }
 
-    /// Takes more or fewer names than there are columns, one of them that of a measured quantity, for those of the first columns.
+    /// Assigns names that are more or fewer than the columns to the first columns, if one of them is that of a measured quantity.
     fn some_names(&self, grid: &Grid, data: usize) -> Option<Names> {
         let (width, mut cells) = (self.shape.width, cells_above(grid, data.checked_sub(1)?)?);
         while cells.last().is_some_and(String::is_empty) {
@@ -109,9 +109,9 @@ impl Data {
             Grid::Text { separator, .. } => Some(*separator),
             Grid::Rows(_) => None,
         };
-        // Names with blanks in them are more than there are.
+        // Blanks within names make them look like more.
         let is_torn = given > width && separator == Some(Separator::Spaces);
-        // Commas may be decimal marks, too.
+        // Commas may also be decimal marks.
         let is_open = 2 * given == width
             && separator == Some(Separator::Comma)
             && !grid.cells(data).iter().any(|cell| cell.to_string().contains('.'));
@@ -129,7 +129,7 @@ impl Data {
     }
 }
 
-/// The cells of a line above the data, of a comment too; the clock of a serial monitor has a name.
+/// Returns the cells of a line above the data, or of a comment; the clock of a serial monitor has a name.
 fn cells_above(grid: &Grid, row: usize) -> Option<Vec<String>> {
     let mut cells: Vec<String> = match (grid.comment(row), grid) {
         (Some(comment), Grid::Text { separator, .. }) if !comment.contains('=') => {
@@ -144,12 +144,12 @@ fn cells_above(grid: &Grid, row: usize) -> Option<Vec<String>> {
     Some(cells)
 }
 
-/// True if a cell may be a name: it is no number and no date.
+/// True if a cell may be a name: it is neither a number nor a date.
 fn is_heading(cell: &str) -> bool {
     cell.is_empty() || cell.parse::<f64>().is_err() && !is_stamp(cell)
 }
 
-/// `Time`, `(s)` → `Time (s)`, where blanks separate the names too.
+/// Joins `Time`, `(s)` to `Time (s)`, because blanks also separate the names.
 fn joined_brackets(cells: Vec<String>) -> Vec<String> {
     let mut out: Vec<String> = Vec::new();
     for cell in cells {

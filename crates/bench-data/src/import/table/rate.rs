@@ -1,9 +1,9 @@
-//! Rows per second, as lines above the data speak of them.
+//! Rows per second, as stated in lines above the data.
 
 use crate::import::table::grid::Grid;
 use crate::import::words::{DecimalMark, number};
 
-/// Words of such a line before the number …
+/// Words of such a line, anywhere before the number.
 const WORDS: [&str; 12] = [
     "sampling rate",
     "sample rate",
@@ -18,10 +18,10 @@ const WORDS: [&str; 12] = [
     "data rate",
     "abtastrate",
 ];
-/// … or begins with: a frequency further on is that of a current, or of the motion.
+/// Words at its start; further on, a frequency is that of a current or of the motion.
 const FIRST_WORDS: [&str; 4] = ["frequency", "rate", "fps", "fs"];
 
-/// The rate of the last line above the data that has one, Hz, and the number of the line.
+/// Returns the rate of the last line above the data that has one, Hz, and the number of the line.
 pub(crate) fn rate(grid: &Grid, decimal: DecimalMark, data: usize) -> Option<(f64, u64)> {
     let of = |row: usize| {
         let cells: Vec<String> = grid.cells(row).iter().map(ToString::to_string).collect();

@@ -15,11 +15,10 @@ use crate::import::table::unit_column;
 use crate::import::table::{interleaved, json, labview};
 use crate::import::words::{DecimalMark, has_groups};
 
-/// Reads a file of any kind: text, XLSX and its relatives, Parquet, each of them in gzip too. `name` is what messages call
-/// it.
+/// Reads a file of any kind: text, XLSX and its relatives, Parquet, each also in gzip. `name` is its name in messages.
 ///
 /// # Errors
-/// [`ImportError`] if it is nothing of that kind, has no rows of numbers, or holds more than may be held.
+/// [`ImportError`] if the file is of no such kind, has no rows of numbers, or exceeds a bound.
 pub fn read_table(bytes: Vec<u8>, name: &str, options: &ReadOptions) -> Result<Table, ImportError> {
     let (contents, wrappings) = open(bytes, name, options.sheet.as_deref())?;
     let mut table = match contents {
@@ -65,7 +64,7 @@ fn of_text(text: &str, encoding: &'static str, name: &str, options: &ReadOptions
     of_lines(name, &grid, layout, skip)
 }
 
-/// A table out of lines below `skip` others, under the header among them; lines may be columns.
+/// Makes a table of the lines below `skip` others, which include the header; lines may be columns.
 fn of_lines(name: &str, grid: &Grid, layout: Layout, skip: usize) -> Result<Table, ImportError> {
     let decimal = layout.decimal;
     if let Some(rows) = exchanged(grid, decimal).filter(|_| skip == 0) {
@@ -77,7 +76,7 @@ fn of_lines(name: &str, grid: &Grid, layout: Layout, skip: usize) -> Result<Tabl
     of_grid(name, grid, header, layout)
 }
 
-/// The only sheet with rows of numbers.
+/// Makes a table of the only sheet with rows of numbers.
 fn of_sheets(sheets: NamedSheets, name: &str, options: &ReadOptions) -> Result<Table, ImportError> {
     let decimal = options.decimal.unwrap_or(DecimalMark::Point);
     let (mut found, mut answers, mut last_error) = (Vec::new(), Vec::new(), None);
@@ -106,10 +105,10 @@ fn of_columns(columns: Vec<RawColumn>, name: &str, format: &str) -> Table {
     Table { file: name.to_owned(), layout, columns, lines: (1..=rows).collect(), ..Table::default() }
 }
 
-/// A table out of lines of cells.
+/// Makes a table of lines of cells.
 ///
 /// # Errors
-/// If it has more cells than may be held.
+/// If it has too many cells.
 fn of_grid(file: &str, grid: &Grid, header: Header, layout: Layout) -> Result<Table, ImportError> {
     check_cells(file, grid.len(), header.shape.width)?;
     let mut layout = Layout {
@@ -142,7 +141,7 @@ fn of_grid(file: &str, grid: &Grid, header: Header, layout: Layout) -> Result<Ta
     }
     let named = header.headings.into_iter().zip(header.units).zip(cells);
     let mut columns: Vec<Column> = named.map(|((heading, unit), cells)| Column::new(heading, unit, cells)).collect();
-    // A separator at the end of each line makes a column of nothing.
+    // A separator at the end of each line makes an empty column.
     while columns.last().is_some_and(|last| last.heading.is_empty() && last.cells.iter().all(str::is_empty)) {
         columns.pop();
     }
@@ -150,7 +149,7 @@ fn of_grid(file: &str, grid: &Grid, header: Header, layout: Layout) -> Result<Ta
     Ok(Table { file: file.to_owned(), layout, metadata: header.metadata, columns, lines: numbers })
 }
 
-/// Returns the first line behind the data: text, sums with a word before them, or a line that was cut.
+/// Returns the first line after the data: text, sums with a word before them, or a truncated line.
 fn end_of_data(grid: &Grid, header: &Header, decimal: DecimalMark) -> usize {
     let is_behind = |row: &usize| {
         let shape = Shape::of(&grid.cells(*row), decimal);

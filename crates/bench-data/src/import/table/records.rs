@@ -1,7 +1,7 @@
 //! Records of `label: value`, as boards and command-line tools print them: on one line or over several.
 //!
 //! A record ends where one of its labels is repeated, or at a line of `---`. Labels below an indented one, as in YAML,
-//! are told apart by the labels above them.
+//! are distinguished by the labels above them.
 
 use std::collections::HashMap;
 
@@ -12,21 +12,21 @@ use crate::import::words::{DecimalMark, Value, amount, has_groups, is_stamp, num
 
 /// Name of the separator in the layout.
 pub(crate) const SEPARATOR: &str = "labels (serial plotter)";
-/// Labels of a record; text with more of them is prose.
+/// Largest number of labels in a record; text with more of them is prose.
 const MOST_LABELS: usize = 1000;
-/// Bytes of a label; longer ones are sentences.
+/// Longest label, bytes; longer ones are sentences.
 const LONGEST_LABEL: usize = 60;
 /// A file of records.
 pub(crate) struct Records<'a> {
     pub headings: Vec<String>,
     pub rows: Rows<'a>,
-    /// The row with most values, as which the others should be.
+    /// Row with the most values, the model for the others.
     pub fullest: usize,
-    /// The decimal mark, and whether commas may group thousands just as well.
+    /// The decimal mark, and whether commas may equally well group thousands.
     pub decimal: (DecimalMark, bool),
 }
 
-/// A record; one without values is a line of something else.
+/// A record; one without values is a line of another kind.
 struct Record<'a> {
     line: u64,
     /// Text that a serial monitor writes before its first line.
@@ -40,14 +40,15 @@ struct Column {
 }
 
 enum Source {
-    /// The value behind a label, without the unit that all of them have.
+    /// The value after a label, without the unit that all its values share.
     Value { label: usize, unit: Option<String> },
-    /// Whole seconds and a fraction, in a unit of so many digits.
+    /// Whole seconds and a fraction, with the number of digits of its unit.
     Seconds { whole: usize, fraction: usize, digits: usize },
 }
 
 impl<'a> Records<'a> {
-    /// Records of lines that are not blank; `None` if most are something else, or no label comes again.
+    /// Finds the records of lines that are not blank; `None` if most lines are of another kind, or if no label is
+    /// repeated.
     pub(crate) fn find(lines: &[(u64, &'a str)], has_clock: bool) -> Option<Self> {
         let body = |line: &'a str| if has_clock { behind_arrow(line) } else { line };
         if !are_records(lines.iter().take(SAMPLE).map(|(_, line)| body(line))) {
@@ -89,7 +90,7 @@ impl<'a> Records<'a> {
 }
 
 impl<'a> Record<'a> {
-    /// The cells of a record, behind the clock of a serial monitor.
+    /// Returns the cells of a record, after the clock of a serial monitor.
     fn cells(&self, columns: &[Column], has_clock: bool) -> Vec<Cell<'a>> {
         let value =
             |label: usize| self.values.iter().find(|(known, _)| *known == label).map_or("", |(_, value)| *value);
@@ -108,7 +109,7 @@ impl<'a> Record<'a> {
     }
 }
 
-/// The decimal mark of values, and whether commas may group thousands just as well.
+/// Returns the decimal mark of values, and whether commas may equally well group thousands.
 fn decimal(rows: &[Record]) -> (DecimalMark, bool) {
     let values = || rows.iter().flat_map(|row| &row.values).map(|(_, value)| *value);
     let is_comma = |value: &&str| value.contains(',') && number(value, DecimalMark::Comma, 0).is_some();
@@ -119,17 +120,17 @@ fn decimal(rows: &[Record]) -> (DecimalMark, bool) {
     (DecimalMark::Comma, commas.all(|value| has_groups(value, DecimalMark::Point)))
 }
 
-/// Labels by the order of their first appearance, each with those above it.
+/// Labels in order of their first appearance, each with those above it.
 #[derive(Default)]
 struct Labels<'a> {
     names: Vec<String>,
     numbers: HashMap<String, usize>,
-    /// Labels without a value that stand above the next line, and how far they are indented.
+    /// Labels without a value above the next line, with their indents.
     above: Vec<(usize, &'a str)>,
 }
 
 impl<'a> Labels<'a> {
-    /// Labels and values of a line; none of one that stands above others.
+    /// Returns labels and values of a line; none for a label that is above others.
     fn of_line(&mut self, line: &'a str) -> Option<Vec<(usize, &'a str)>> {
         let pairs = pairs(line)?;
         let indent = line.len() - line.trim_start().len();
@@ -155,14 +156,14 @@ impl<'a> Labels<'a> {
     }
 }
 
-/// True if four lines in five have labels that come again, one of them with numbers.
+/// True if more than four lines in five have only repeated labels, and some repeated label has only numbers.
 fn are_records<'a>(lines: impl Iterator<Item = &'a str>) -> bool {
     let (mut labels, mut all) = (Labels::default(), Vec::new());
     for line in lines.filter(|line| !is_rule(line)) {
         all.push(labels.of_line(line));
     }
     let pairs = || all.iter().flatten().flatten();
-    // How often a label comes, and whether all of its values are numbers.
+    // Number of occurrences of each label, and whether all of its values are numbers.
     let mut known = vec![(0_usize, true); labels.names.len()];
     for (label, value) in pairs() {
         known[*label].0 += 1;
@@ -173,13 +174,13 @@ fn are_records<'a>(lines: impl Iterator<Item = &'a str>) -> bool {
     fitting * 10 > all.len() * 8 && known.iter().any(|(count, is_number)| *count > 1 && *is_number)
 }
 
-/// True if a text has a number in it, perhaps with a unit, or is a time.
+/// True if a text is a number, perhaps with a unit, or a time.
 fn is_amount(text: &str) -> bool {
     let is_number = |mark: &DecimalMark| amount(text, *mark) != Value::Text;
     [DecimalMark::Point, DecimalMark::Comma].iter().any(is_number) || is_stamp(text) || unit_behind(text).is_some()
 }
 
-/// The unit behind a number.
+/// Returns the unit after a number.
 fn unit_behind(text: &str) -> Option<&str> {
     let (amount, unit) = text.rsplit_once(char::is_whitespace)?;
     let is_number = number(amount.trim(), DecimalMark::Point, 0).or(number(amount.trim(), DecimalMark::Comma, 0));
@@ -192,7 +193,8 @@ fn is_rule(line: &str) -> bool {
     line.len() > 1 && line.bytes().all(|byte| matches!(byte, b'-' | b'=' | b'*' | b'_' | b'#'))
 }
 
-/// Labels and values of a line: several numbers, `R:1600.5,strain:0.1`, or one value of any kind, `frame: base`.
+/// Returns labels and values of a line: several numbers, `R:1600.5,strain:0.1`, or one value of any kind,
+/// `frame: base`.
 fn pairs(line: &str) -> Option<Vec<(&str, &str)>> {
     several(line.trim()).or_else(|| {
         let (label, value) = line.split_once([':', '='])?;
@@ -221,7 +223,7 @@ fn is_label(text: &str) -> bool {
     text.starts_with(char::is_alphabetic) && text.len() <= LONGEST_LABEL
 }
 
-/// The columns of labels: a label is shown without those above it if it is the only one of its name.
+/// Returns the columns of labels. A label is shown without those above it if its name is unique.
 fn columns(names: &[String], rows: &[Record]) -> Vec<Column> {
     let last = |name: &str| name.rsplit('.').next().unwrap_or_default().to_owned();
     let above = |name: &str| name.rsplit_once('.').map_or("", |(above, _)| above).to_owned();
@@ -250,7 +252,7 @@ fn columns(names: &[String], rows: &[Record]) -> Vec<Column> {
     names.iter().enumerate().filter(|(label, _)| !fractions.contains(label)).map(column).collect()
 }
 
-/// The unit that stands behind every value of a label: `Some(None)` if there is none, or another one.
+/// Returns the unit after every value of a label: `Some(None)` if there is none, or if they differ.
 fn units_of_all<'a>(labels: usize, rows: &[Record<'a>]) -> Vec<Option<Option<&'a str>>> {
     let mut units: Vec<Option<Option<&str>>> = vec![None; labels];
     for (label, value) in rows.iter().flat_map(|row| &row.values) {
@@ -263,7 +265,7 @@ fn units_of_all<'a>(labels: usize, rows: &[Record<'a>]) -> Vec<Option<Option<&'a
     units
 }
 
-/// True if a text is no missing value, which would have no unit.
+/// True if a text is not a missing value, which would have no unit.
 fn value_is_there(text: &str) -> bool {
     value(text, DecimalMark::Point, 0, &[]) != Value::Missing
 }

@@ -1,4 +1,4 @@
-//! Rows of a table that are wanted: those with a value in a column, and those of one stretch.
+//! Selection of a table's rows: those with a given value in a column, and those of one range.
 
 use std::fmt;
 use std::ops::Range;
@@ -9,10 +9,10 @@ use crate::import::bytes::Cells;
 use crate::import::error::ImportError;
 use crate::import::table::columns::{Column, Table};
 
-/// Values of a column that a message names.
+/// Largest number of values of a column that a message lists.
 const MOST_VALUES: usize = 8;
 
-/// The rows in which a value stands in a column: `trial=2`.
+/// Filter for rows with a given value in a column: `trial=2`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RowFilter {
     /// Heading, name or number (from 1) of the column.
@@ -37,7 +37,7 @@ impl FromStr for RowFilter {
 }
 
 impl Table {
-    /// The column that a text calls by its heading, its name or its number.
+    /// Returns the column with this heading, name or number.
     pub(crate) fn called(&self, text: &str) -> Option<usize> {
         let place = |is_it: &dyn Fn(&Column) -> bool| self.columns.iter().position(is_it);
         let lower = text.to_lowercase();
@@ -47,10 +47,10 @@ impl Table {
             .or_else(|| text.parse::<usize>().ok()?.checked_sub(1).filter(|place| *place < self.columns.len()))
     }
 
-    /// Keeps the rows that a filter wants.
+    /// Keeps the rows that pass a filter.
     ///
     /// # Errors
-    /// If there is no such column, or no such row.
+    /// If the column does not exist, or no row passes.
     pub(crate) fn keep(&mut self, filter: &RowFilter) -> Result<(), ImportError> {
         let Some(place) = self.called(&filter.column) else {
             let what = format!("there is no column {} among {}", quote(&filter.column), self.list());
@@ -68,7 +68,7 @@ impl Table {
         Ok(())
     }
 
-    /// The table with some of its rows.
+    /// Returns the table with a range of its rows.
     pub(crate) fn stretch(&self, rows: Range<usize>) -> Self {
         self.rows(rows)
     }
@@ -84,7 +84,7 @@ impl Table {
         }
     }
 
-    /// The values of a column, each once.
+    /// Returns the distinct values of a column.
     pub(crate) fn values(&self, place: usize) -> Vec<&str> {
         let mut values: Vec<&str> = Vec::new();
         for value in self.columns[place].cells.iter() {
@@ -105,7 +105,7 @@ fn is_same_number(cell: &str, value: &str) -> bool {
     matches!((cell.trim().parse::<f64>(), value.parse::<f64>()), (Ok(cell), Ok(value)) if cell == value)
 }
 
-/// Values for a message.
+/// Lists values for a message.
 fn listed(values: &[&str]) -> String {
     let shown: Vec<String> = values.iter().take(MOST_VALUES).map(|value| quote(value)).collect();
     shown.join(", ") + if values.len() > MOST_VALUES { " …" } else { "" }

@@ -1,20 +1,20 @@
-//! Tables whose lines are columns: a name, and then all the numbers of it.
+//! Tables whose lines are columns: a name, followed by all its numbers.
 
 use crate::import::bytes::{Cell, Rows};
 use crate::import::table::grid::Grid;
 use crate::import::table::value::is_number;
 use crate::import::words::{DecimalMark, units};
 
-/// Lines of such a table, at most.
+/// Largest number of lines in such a table.
 const MOST_LINES: usize = 24;
-/// Cells of each line, at least, in all and for each line.
+/// Least number of cells in each line, absolutely and per line of the table.
 const FEWEST_CELLS: usize = 20;
 const CELLS_PER_LINE: usize = 4;
-/// Cells before the numbers: a name and a unit.
+/// Largest number of cells before the numbers: a name and a unit.
 const MOST_LABELS: usize = 2;
 
-/// The rows of a table whose rows and columns are exchanged, under a line of names if it has some; `None` if it is no such
-/// table. Rows have the numbers of the cells that they are made of.
+/// Returns the rows of a table whose rows and columns are exchanged, below a line of names if there are any; `None` if it is not such a
+/// table. The number of a row is that of its cells in the lines.
 pub(crate) fn exchanged(grid: &Grid, decimal: DecimalMark) -> Option<Rows<'static>> {
     let lines: Vec<usize> = (0..grid.len()).filter(|row| grid.comment(*row).is_none()).take(MOST_LINES + 1).collect();
     if !(2..=MOST_LINES).contains(&lines.len()) {
@@ -43,7 +43,7 @@ pub(crate) fn exchanged(grid: &Grid, decimal: DecimalMark) -> Option<Rows<'stati
     Some(names.into_iter().chain((labels..width).map(row)).collect())
 }
 
-/// The cells of a line up to the last that is not empty.
+/// Returns the cells of a line up to the last that is not empty.
 fn filled<'a>(grid: &'a Grid, row: usize) -> Vec<Cell<'a>> {
     let mut cells = grid.cells(row).into_owned();
     while cells.last().is_some_and(Cell::is_empty) {
@@ -52,7 +52,7 @@ fn filled<'a>(grid: &'a Grid, row: usize) -> Vec<Cell<'a>> {
     cells
 }
 
-/// Returns the number of cells in each line that are words before its numbers; `None` if some lines have one and others none.
+/// Returns the number of words before the numbers of each line; `None` if only some lines have one.
 fn labels(lines: &[Vec<Cell>], decimal: DecimalMark) -> Option<usize> {
     let of = |line: &Vec<Cell>| line.iter().take_while(|cell| !is_number(cell, decimal)).count();
     let most = lines.iter().map(of).max()?;
@@ -61,7 +61,7 @@ fn labels(lines: &[Vec<Cell>], decimal: DecimalMark) -> Option<usize> {
     (most == 0 || (most <= MOST_LABELS && lines.iter().all(has_name))).then_some(most)
 }
 
-/// A name with the unit behind it.
+/// Joins a name with the unit after it.
 fn name(labels: &[Cell]) -> Cell<'static> {
     let texts: Vec<String> = labels.iter().map(Cell::to_string).collect();
     Cell::Text(match &texts[..] {

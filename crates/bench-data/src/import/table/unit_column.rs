@@ -6,7 +6,7 @@ use crate::import::words::units;
 /// Names of such columns, in lower case.
 const NAMES: [&str; 6] = ["unit", "units", "einheit", "unité", "unidad", "单位"];
 
-/// Gives a column without a unit the one that stands in the column behind it, in all rows alike.
+/// Moves a unit from the column after a column without one, if all rows have the same unit.
 pub(crate) fn take(table: &mut Table) {
     for place in 1..table.columns.len() {
         let (before, behind) = table.columns.split_at_mut(place);

@@ -3,7 +3,8 @@
 use crate::import::bytes::Cell;
 use crate::import::words::{DecimalMark, SCPI_OVERLOAD, Value, is_stamp, number, value};
 
-/// Returns the value of a cell of any container. Numbers have no marks, whatever those of the file's texts are.
+/// Returns the value of a cell of any container. Binary numbers have no decimal mark, whatever that of the file's
+/// texts.
 pub(crate) fn value_of(cell: &Cell, mark: DecimalMark, shift: i32, own: &[String]) -> Value {
     match cell {
         Cell::Number(number) if shift == 0 && own.is_empty() && number.abs() < SCPI_OVERLOAD => Value::Number(*number),
@@ -12,7 +13,7 @@ pub(crate) fn value_of(cell: &Cell, mark: DecimalMark, shift: i32, own: &[String
     }
 }
 
-/// The number in a cell.
+/// Returns the number in a cell.
 pub(crate) fn number_of(cell: &Cell, mark: DecimalMark) -> Option<f64> {
     match cell {
         Cell::Number(number) => Some(*number).filter(|number| number.is_finite()),

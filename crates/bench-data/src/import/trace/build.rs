@@ -15,29 +15,29 @@ use crate::import::words::Role;
 use crate::metadata::{Metadata, ResistanceUnit, StrainUnit};
 use crate::rows::RowWriter;
 
-/// Texts that stand for missing values and are named.
+/// Largest number of texts for missing values that a remark lists.
 const MOST_TEXTS: usize = 8;
 
-/// A trace out of files.
+/// A trace made from files.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Imported {
     /// The trace.
     pub trace: Trace,
     /// Remarks on what was left out, filled in or noticed, one line each.
     pub remarks: Vec<String>,
-    /// Lag of the reference's clock that was taken out, if it was found by the motion.
+    /// Lag that was subtracted from the reference's clock, if it was found by the motion.
     pub lag: Option<Lag>,
-    /// Rows left out because they had the time of the row before.
+    /// Number of rows omitted because they had the time of the previous row.
     pub duplicates: usize,
-    /// Amplitude by which neighbouring readings alternated, relative to their size, if they did: the current's polarity flips.
+    /// Amplitude by which neighbouring readings alternated, relative to their size, if they did; the current's polarity then alternates.
     pub alternation: Option<f64>,
 }
 
 impl Plan {
-    /// The trace, and what was done to get it.
+    /// Makes the trace, with remarks on the conversion.
     ///
     /// # Errors
-    /// [`ImportError`] for cells that are no numbers, times that go back, and motion that does not tell the clocks apart.
+    /// [`ImportError`] for cells that are not numbers, times that decrease, and motion that does not determine the lag of the clocks.
     pub fn import(&self, tables: &[Table]) -> Result<Imported, ImportError> {
         match self.recipe.recording {
             Some(number) => self.import_all(&self.recording(tables, number)?),
@@ -73,7 +73,7 @@ impl Plan {
     }
 }
 
-/// An import under way.
+/// State of an import.
 pub(crate) struct Work<'a> {
     pub plan: &'a Plan,
     pub tables: &'a [Table],
@@ -90,7 +90,7 @@ impl Work<'_> {
         self.remarks.push(format!("{}: {text}", self.tables[file].file));
     }
 
-    /// The readings over time, by how much neighbours alternate, and when they begin.
+    /// Returns the readings over time, the amplitude by which neighbours alternate, and the start of the clock.
     fn readings(&mut self, timed: &Timed) -> Result<(Series, Option<f64>, Option<Zero>), ImportError> {
         let (channel, file) = (&timed.values, timed.values.place.file);
         let times = Times::read(self.tables, &timed.clock, &self.plan.recipe.missing)?;
@@ -117,7 +117,8 @@ impl Work<'_> {
         Ok((series, alternation, times.zero))
     }
 
-    /// A column's numbers as they are wanted: sizes instead of signs, zeros that are none left out.
+    /// Returns a column's numbers after the recipe's corrections: magnitudes instead of signed values, and spurious zeros as missing
+    /// values.
     fn values(&mut self, channel: &Channel) -> Result<Vec<f64>, ImportError> {
         let (file, recipe) = (channel.place.file, &self.plan.recipe);
         let Values { mut values, missing } = Values::read(self.tables, channel, &recipe.missing)?;
@@ -150,7 +151,7 @@ impl Work<'_> {
         Ok(values)
     }
 
-    /// Rows in the order of time; what is left out is remarked.
+    /// Returns the rows in the order of time; omitted rows are remarked.
     fn ordered(&mut self, file: usize, time: &[f64], value: Vec<f64>) -> Result<Series, ImportError> {
         let (series, untimed, repeated) = Series::ordered(&self.tables[file], time, value)?;
         if untimed > 0 {
@@ -163,7 +164,7 @@ impl Work<'_> {
         Ok(series)
     }
 
-    /// Values at the readings' times: of the same rows, or between those of another clock.
+    /// Returns values at the readings' times: of the same rows, or interpolated from another clock.
     fn beside(
         &mut self,
         timed: &Timed,
@@ -223,7 +224,7 @@ impl Work<'_> {
         let recipe = &self.plan.recipe;
         let mut other = vec![("imported_from".to_owned(), all_files(self.tables))];
         other.extend(zero.map(|zero| ("time_zero".to_owned(), zero)));
-        // The units are known now, and nobody has to ask for them again.
+        // The units are now known, so the metadata need not state them.
         let is_strain = reference.is_some_and(|it| matches!(it.values.role, Role::Strain | Role::Displacement));
         let mut metadata = Metadata { strain_unit: None, resistance_unit: None, ..metadata };
         metadata.override_with(&Metadata {
@@ -239,7 +240,7 @@ impl Work<'_> {
     }
 }
 
-/// Writes the schema and reads it: every unit is converted, and every value judged, where traces are read.
+/// Writes the trace's CSV and reads it back, so that all conversions and checks are those of the trace reader.
 fn trace(metadata: &Metadata, columns: &[(Role, Vec<f64>)], file: &str) -> Result<Trace, ImportError> {
     let mut rows = RowWriter::new(metadata.to_string().into_bytes());
     columns.iter().for_each(|(role, _)| rows.text(column(*role).name()));
@@ -259,7 +260,7 @@ fn trace(metadata: &Metadata, columns: &[(Role, Vec<f64>)], file: &str) -> Resul
     })
 }
 
-/// The column of a trace that a role becomes.
+/// Returns the column of a trace for a role.
 const fn column(role: Role) -> Column {
     match role {
         Role::Time | Role::ReferenceTime => Column::TimeS,
@@ -273,7 +274,7 @@ const fn column(role: Role) -> Column {
     }
 }
 
-/// An error in terms of what is added to the reference's clock.
+/// Expresses an error in terms of the offset that is added to the reference's clock.
 fn as_offset(error: LagError) -> LagError {
     match error {
         LagError::Repeats(best, other) => LagError::Repeats(-best, -other),

@@ -1,4 +1,4 @@
-//! All channels of files at once: a column of readings for each, and its reference.
+//! All channels of files at once: a column of readings for each, with its reference.
 
 use std::io::{self, Write};
 
@@ -39,12 +39,12 @@ pub struct EachTrace {
 }
 
 impl EachPlan {
-    /// Decides which columns are readings, those that `given` names or all that look like readings of one kind, and which is the
+    /// Decides which columns are readings: those that `given` names, or all that look like readings of one kind. Also decides on the
     /// reference of each: one of `pairs`, one whose name has the same stem (`Thumb angle` beside `Thumb`, `theta1` beside `R1`), or the
     /// only one.
     ///
     /// # Errors
-    /// [`ImportError::Question`] for the first thing that nothing decides, and if there are not two channels.
+    /// [`ImportError::Question`] for the first open question, and if there are fewer than two channels.
     pub fn new(tables: &[Table], given: &Recipe, pairs: &[(ColumnName, ColumnName)]) -> Result<Self, ImportError> {
         let readings = readings(tables, given);
         if readings.len() < 2 {
@@ -72,13 +72,13 @@ impl EachPlan {
         Ok(Self { channels: named.map(|(name, plan)| PlannedChannel { name, plan }).collect() })
     }
 
-    /// True if all channels have one reference, or none has any.
+    /// True if all channels have the same reference, or none has any.
     fn is_shared(&self) -> bool {
         let first = self.channels.first().and_then(|channel| channel.plan.reference());
         self.channels.iter().all(|channel| channel.plan.reference() == first)
     }
 
-    /// True if each channel has a reference that no other has: these are several joints.
+    /// True if each channel has its own reference, as with several joints.
     #[must_use]
     pub fn are_joints(&self) -> bool {
         let references: Vec<Option<FileColumn>> =
@@ -87,7 +87,7 @@ impl EachPlan {
         references.iter().enumerate().all(is_own)
     }
 
-    /// Columns that were taken, as messages call them: name, reading, reference.
+    /// Returns the chosen columns by their names in messages: name, reading, reference.
     #[must_use]
     pub fn columns(&self, tables: &[Table]) -> Vec<(String, String, Option<String>)> {
         let heading = |place: FileColumn| tables[place.file].name(place.column);
@@ -98,10 +98,10 @@ impl EachPlan {
         self.channels.iter().map(of).collect()
     }
 
-    /// The recording, and what was done to get it.
+    /// Makes the recording, with remarks on the conversion.
     ///
     /// # Errors
-    /// Those of [`Plan::import`], and if the channels do not share their rows.
+    /// As [`Plan::import`], and if the channels do not share their rows.
     pub fn import(&self, tables: &[Table]) -> Result<EachTrace, ImportError> {
         let mut imported = Vec::with_capacity(self.channels.len());
         for channel in &self.channels {
@@ -115,7 +115,7 @@ impl EachPlan {
         }
         let mut remarks: Vec<String> = Vec::new();
         let mut metadata = imported[0].trace.metadata.clone();
-        // Zeros that were taken from columns are another one's in each.
+        // Zeros that were taken from columns differ between the channels.
         metadata.other.retain(|(key, _)| key != "made_by" && !key.ends_with("_zero"));
         let (mut columns, mut values) = (vec!["time_s".to_owned()], vec![time_s]);
         for (channel, Imported { trace, remarks: own, .. }) in self.channels.iter().zip(&imported) {
@@ -169,7 +169,8 @@ impl EachTrace {
     }
 }
 
-/// Columns of readings: those that the recipe names, or those that look like readings, by name if two do so, of the kind of the first.
+/// Returns the columns of readings: those that the recipe names, or those that look like readings of the first one's kind, by name if at
+/// least two do.
 fn readings(tables: &[Table], given: &Recipe) -> Vec<(Role, ColumnName)> {
     let named = given.columns.iter().filter(|(role, name)| Role::READINGS.contains(role) && !name.is_none());
     let named: Vec<(Role, ColumnName)> = named.cloned().collect();
@@ -183,7 +184,7 @@ fn readings(tables: &[Table], given: &Recipe) -> Vec<(Role, ColumnName)> {
     fitting().filter(|one| one.role == role).map(|one| (role, refer(tables, one.place()))).collect()
 }
 
-/// The role of a reference that a pair names.
+/// Returns the role of a reference that a pair names.
 fn reference_role(tables: &[Table], name: &ColumnName) -> Result<Role, ImportError> {
     let found = candidates(tables);
     let is_it = |place: FileColumn| {
@@ -199,7 +200,7 @@ fn reference_role(tables: &[Table], name: &ColumnName) -> Result<Role, ImportErr
     })
 }
 
-/// Asks for the reference of a channel that has none, if a column could be one and nobody has said that it is not.
+/// Asks for the reference of a channel without one, if a column could be it and the user has not excluded that.
 fn unreferenced(tables: &[Table], given: &Recipe, reading: &ColumnName) -> Result<(), ImportError> {
     let is_open = |role: Role| Role::REFERENCES.contains(&role) && given.column(role).is_none();
     let open: Vec<_> = candidates(tables).into_iter().filter(|one| is_open(one.role)).collect();
@@ -214,7 +215,7 @@ fn unreferenced(tables: &[Table], given: &Recipe, reading: &ColumnName) -> Resul
     Err(ImportError::question(&tables[0].file, format!("nothing tells the reference of `{reading}`"), answers))
 }
 
-/// A question about a reference, with the answers of a channel among several.
+/// Converts the answers of a question about a reference to those for one channel of several.
 fn paired(error: ImportError, reading: &ColumnName) -> ImportError {
     let ImportError::Question { file, what, answers } = error else { return error };
     let is_of = |answer: &String, role: &Role| answer.contains(&format!("{}=", role.name()));
@@ -230,7 +231,7 @@ fn paired(error: ImportError, reading: &ColumnName) -> ImportError {
     ImportError::Question { file, what, answers: answers.into_iter().map(pair).collect() }
 }
 
-/// Names of channels: what is theirs in their headings, or else the heading.
+/// Returns names of channels: the distinguishing part of their headings, or else the heading.
 fn names_of(tables: &[Table], plans: &[Plan]) -> Vec<String> {
     let plain = |text: &str| -> String {
         let kept = text.trim().chars().map(|c| if c.is_alphanumeric() { c } else { '_' });
@@ -251,7 +252,7 @@ fn names_of(tables: &[Table], plans: &[Plan]) -> Vec<String> {
     found.iter().enumerate().map(own).collect()
 }
 
-/// Ending of a column of readings.
+/// Returns the suffix of a column of readings.
 const fn unit(trace: &Trace) -> &'static str {
     match (&trace.readings.converter, trace.readings.kind) {
         (Some(_), _) => "adc",
@@ -260,7 +261,7 @@ const fn unit(trace: &Trace) -> &'static str {
     }
 }
 
-/// Readings as they are written: codes of a converter, or values.
+/// Returns the readings as written: codes of a converter, or values.
 fn readings_of(trace: &Trace) -> Vec<f64> {
     match &trace.readings.converter {
         Some(converter) => converter.codes.iter().map(|code| code.map_or(f64::NAN, f64::from)).collect(),

@@ -1,10 +1,10 @@
-//! Remarks of an import on files besides their columns: on what was passed over, and on how they were read.
+//! Remarks of an import on files rather than columns: on skipped parts, and on how they were read.
 
 use crate::counted::counted;
 use crate::import::trace::build::Work;
 
 impl Work<'_> {
-    /// Files from which nothing is taken.
+    /// Adds remarks on files from which nothing is taken.
     pub(crate) fn mention_unused(&mut self) {
         let taken = self.plan.decision.readings.iter().chain(&self.plan.decision.reference);
         let used: Vec<usize> = taken.map(|timed| timed.values.place.file).collect();
@@ -13,7 +13,7 @@ impl Work<'_> {
         }
     }
 
-    /// Lines that are no rows, and rows that lack cells.
+    /// Adds remarks on lines that are not rows, and on rows that lack cells.
     pub(crate) fn mention_passed_over(&mut self) {
         for (index, table) in self.tables.iter().enumerate() {
             let layout = &table.layout;

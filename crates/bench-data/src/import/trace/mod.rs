@@ -1,4 +1,4 @@
-//! A plan, the trace that it makes of files, and what the trace is like.
+//! A plan, the trace that it makes from files, and a survey of the trace.
 
 mod build;
 mod each;

@@ -7,10 +7,10 @@ use crate::import::table::Table;
 use crate::import::words::units::SCALED;
 use crate::import::words::{DecimalMark, Role};
 
-/// Signs are arbitrary where a larger share of the readings than this is negative.
+/// Fraction of negative readings above which signs count as arbitrary.
 const FEW_SIGNS: f64 = 0.1;
 
-/// An import with nothing left open.
+/// An import without open questions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
     /// Answers that were given.
@@ -23,10 +23,10 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Decides all that the recipe leaves open, by names, units and numbers.
+    /// Decides by names, units and numbers everything that the recipe leaves open.
     ///
     /// # Errors
-    /// [`ImportError::Question`] for the first thing that nothing decides.
+    /// [`ImportError::Question`] for the first open question.
     pub fn new(tables: &[Table], given: &Recipe) -> Result<Self, ImportError> {
         Self::of(&Found::of(tables), given.clone())
     }
@@ -40,11 +40,11 @@ impl Plan {
         }
     }
 
-    /// The plan for what `inspect` proposes: beside what [`new`](Self::new) decides, a preset that fits, signs that are
-    /// arbitrary, polarity that flips, stretch ratios that are 1 at rest, and clocks of two files that the motion brings together.
+    /// Makes the plan that `inspect` proposes. In addition to the decisions of [`new`](Self::new), it has a matching preset, arbitrary
+    /// signs, alternating polarity, stretch ratios that are 1 at rest, and an alignment of two files' clocks by the motion.
     ///
     /// # Errors
-    /// [`ImportError::Question`] for the first thing that nothing decides.
+    /// [`ImportError::Question`] for the first open question.
     pub fn propose(tables: &[Table], given: &Recipe) -> Result<Self, ImportError> {
         let found = Found::of(tables);
         let fits = found.preset.filter(|_| tables.len() == 1 && given.columns.is_empty());
@@ -62,12 +62,12 @@ impl Plan {
         Ok(Self { given: recipe.clone(), recipe, ..plan })
     }
 
-    /// The readings that the trace has.
+    /// Returns the channel of the trace's readings.
     pub(crate) fn readings(&self) -> &Channel {
         &self.decision.readings[0].values
     }
 
-    /// The column of the reference, if there is one.
+    /// Returns the column of the reference, if there is one.
     pub(crate) fn reference(&self) -> Option<FileColumn> {
         self.decision.reference.as_ref().map(|reference| reference.values.place)
     }
@@ -83,7 +83,7 @@ impl Plan {
             out.columns.push((channel.role, refer(tables, channel.place)));
             out.units.push((channel.role, self.unit_text(channel).to_owned()));
         }
-        // What is to be left out stays so.
+        // Columns that the user excluded stay excluded.
         out.columns.extend(self.given.columns.iter().filter(|(_, name)| name.is_none()).cloned());
         for (index, table) in tables.iter().enumerate() {
             let file = (tables.len() > 1).then_some(index + 1);
@@ -99,7 +99,7 @@ impl Plan {
         out
     }
 
-    /// The column that a role was given, as messages call it, with its file and unit.
+    /// Returns the column of each role by its name in messages, with its file and unit.
     #[must_use]
     pub fn columns(&self, tables: &[Table]) -> Vec<(Role, usize, usize, String, &str)> {
         let describe = |channel: &Channel| {
@@ -109,7 +109,7 @@ impl Plan {
         self.decision.channels().iter().map(describe).collect()
     }
 
-    /// The unit as flags have it.
+    /// Returns the unit as written in flags.
     fn unit_text(&self, channel: &Channel) -> &str {
         match channel.unit.name {
             SCALED => self.recipe.unit(channel.role).unwrap_or(SCALED),
@@ -118,11 +118,11 @@ impl Plan {
     }
 }
 
-/// Completes a recipe by signs that have no meaning: those of many readings, and those that flip from one to the next.
+/// Completes a recipe for meaningless signs: many negative readings, or signs that alternate from one to the next.
 fn with_signs(recipe: Recipe, role: Role, readings: &[f64]) -> Recipe {
     let known = readings.iter().filter(|value| !value.is_nan()).count();
     let negative = readings.iter().filter(|value| **value < 0.0).count();
-    // A few, such as -999, mean something else: a question.
+    // A few, such as -999, have another meaning, which raises a question.
     let are_arbitrary = role == Role::Resistance && negative as f64 > FEW_SIGNS * known as f64;
     let is_new = are_arbitrary && !recipe.magnitude.contains(&role);
     let sizes: Vec<f64> = readings.iter().map(|value| value.abs()).collect();

@@ -8,14 +8,14 @@ use crate::import::series::Times;
 use crate::import::table::Table;
 use crate::import::trace::plan::Plan;
 
-/// Rows of a recording; fewer are rows that are out of order.
+/// Least number of rows in a recording; fewer are rows that are out of order.
 const FEWEST_ROWS: usize = 3;
 /// Names of columns that count recordings, in lower case.
 const COUNTERS: [&str; 9] = ["trial", "run", "rep", "repetition", "recording", "session", "test", "experiment", "take"];
 
 impl Plan {
-    /// Splits a file into its recordings, one below the other, each as tables of its own: a new one begins where the clock restarts, or
-    /// where a column called `trial`, `run` or so has another value. Returns one recording if there is no such place.
+    /// Splits a file into its recordings, one below the other, each as its own tables. A new one begins where the clock restarts, or where
+    /// a column such as `trial` or `run` changes its value. Returns a single recording if there is no such place.
     ///
     /// # Errors
     /// [`ImportError`] for times that cannot be read, rows that are out of order, and files beside the one with the readings.
@@ -28,7 +28,7 @@ impl Plan {
         Ok(ranges.into_iter().map(|rows| tables.iter().map(|table| table.stretch(rows.clone())).collect()).collect())
     }
 
-    /// The rows of each recording.
+    /// Returns the rows of each recording.
     fn ranges(&self, tables: &[Table]) -> Result<Vec<Range<usize>>, ImportError> {
         let clock = &self.decision.readings[0].clock;
         let table = &tables[clock.file()];
@@ -59,7 +59,7 @@ impl Plan {
         }
     }
 
-    /// The tables of one recording, counted from 1.
+    /// Returns the tables of one recording, counted from 1.
     pub(crate) fn recording(&self, tables: &[Table], number: usize) -> Result<Vec<Table>, ImportError> {
         let mut all = self.recordings(tables)?;
         let count = all.len();
@@ -71,7 +71,7 @@ impl Plan {
     }
 }
 
-/// True if a column counts recordings: by its name, and in stretches of rows.
+/// True if a column numbers recordings: by its name, and with constant values over ranges of rows.
 fn counts_recordings(table: &Table, column: usize) -> bool {
     let name = table.columns[column].name.to_lowercase();
     let word = name.split(|c: char| !c.is_alphabetic()).find(|word| !word.is_empty()).unwrap_or_default();

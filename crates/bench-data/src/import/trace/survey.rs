@@ -5,9 +5,9 @@ use crate::import::trace::build::Imported;
 use crate::order::{extent, median, typical_step};
 use crate::segment::{Segment, noise_sd, segment};
 
-/// A step longer than so many typical ones is a gap.
+/// Step, in typical ones, above which it is a gap.
 const GAP: f64 = 3.0;
-/// The lowest part of the reference's range, in which drift is looked for.
+/// Fraction of the reference's range, from its low end, in which drift is estimated.
 const LOWEST: f64 = 0.1;
 
 /// Steps of a clock.
@@ -15,17 +15,17 @@ const LOWEST: f64 = 0.1;
 pub struct ClockSurvey {
     /// Typical step, s.
     pub step_s: f64,
-    /// A twentieth of the steps is shorter, a twentieth longer, s.
+    /// 5 % and 95 % quantiles of the steps, s.
     pub step_range_s: (f64, f64),
     /// First and last time, s.
     pub span_s: (f64, f64),
-    /// Steps longer than three typical ones, and the longest step, s.
+    /// Number of steps longer than three typical ones, and the longest step, s.
     pub gaps: (usize, f64),
-    /// Rows left out because they had the time of the one before.
+    /// Number of rows omitted because they had the time of the previous row.
     pub duplicates: usize,
 }
 
-/// Least scatter of means over a time: what averaging can reach before drift begins.
+/// Allan deviation at one averaging time; the least one is the limit of averaging before drift dominates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Allan {
     /// Averaging time, s.
@@ -37,15 +37,15 @@ pub struct Allan {
 /// Values of a channel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChannelSurvey {
-    /// Known and missing values.
+    /// Number of known and of missing values.
     pub counts: (usize, usize),
-    /// Smallest and largest.
+    /// Smallest and largest value.
     pub range: (f64, f64),
-    /// Values in runs at the smallest and at the largest one, if they stand there longer than elsewhere.
+    /// Number of values in runs at the smallest and at the largest one, if such runs are rare elsewhere.
     pub clipped: (usize, usize),
-    /// Standard deviation of what is not motion, from how far values lie off the line between their neighbours.
+    /// Standard deviation of the noise, from the distances of values from the line between their neighbours.
     pub noise: f64,
-    /// Allan deviations over averaging times that double, in the longest hold; in all rows of a recording without a
+    /// Allan deviations over averaging times that double, in the longest hold, or in all rows of a recording without a
     /// reference; none if the body never holds still.
     pub allan: Vec<Allan>,
 }
@@ -53,7 +53,7 @@ pub struct ChannelSurvey {
 /// Phases of the body's motion.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PhaseSurvey {
-    /// Number of phases and their time, s: extend, hold, retract.
+    /// Number and total duration, s, of each phase: extend, hold, retract.
     pub phases: [(usize, f64); 3],
     /// The segments.
     pub segments: Vec<Segment>,
@@ -70,13 +70,14 @@ pub struct Survey {
     pub reference: Option<ChannelSurvey>,
     /// Phases of the reference.
     pub phases: Option<PhaseSurvey>,
-    /// Change of the readings from the first to the last time at rest (at all, without a reference), relative.
+    /// Relative change of the readings from the first to the last time at rest; over the whole recording without a
+    /// reference.
     pub drift: Option<f64>,
     /// Amplitude by which neighbouring readings alternate, relative to their size, if they do.
     pub alternation: Option<f64>,
     /// Lag of the reference behind the readings.
     pub lag: Option<Lag>,
-    /// Reason for not knowing it.
+    /// Reason why the lag is unknown.
     pub lag_unknown: Option<String>,
 }
 
@@ -109,7 +110,7 @@ impl Survey {
     }
 }
 
-/// Surveys the steps of a clock; `duplicates` were left out of it.
+/// Surveys the steps of a clock, from which `duplicates` rows were omitted.
 fn clock_survey(time_s: &[f64], duplicates: usize) -> ClockSurvey {
     let mut steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
     steps.sort_by(f64::total_cmp);
@@ -138,7 +139,7 @@ fn channel_survey(time_s: &[f64], values: &[f64], quiet: &std::ops::Range<usize>
     }
 }
 
-/// Values at an end of the range that stand there in runs, while elsewhere hardly two neighbours are alike.
+/// Counts values in runs at an end of the range, if neighbours are rarely equal elsewhere.
 fn clipped(values: &[f64], end: f64) -> usize {
     const SHORTEST_RUN: usize = 3;
     let alike = values.windows(2).filter(|pair| pair[0] == pair[1] && pair[0] != end).count();
@@ -149,18 +150,18 @@ fn clipped(values: &[f64], end: f64) -> usize {
     runs.map(<[f64]>::len).sum()
 }
 
-/// Allan deviations of values at hardly uneven steps; gaps are passed over.
+/// Returns Allan deviations of values at nearly even steps; gaps are ignored.
 fn allan(time_s: &[f64], values: &[f64]) -> Vec<Allan> {
     let Some(step_s) = typical_step(time_s) else { return Vec::new() };
     let known: Vec<f64> = values.iter().copied().filter(|value| !value.is_nan()).collect();
     let mut sums = vec![0.0];
     for value in &known {
-        // Relative to the first, so that sums keep their digits.
+        // Relative to the first value, so that sums keep their digits.
         sums.push(sums[sums.len() - 1] + (value - known[0]));
     }
     let mut out = Vec::new();
     let mut width = 1;
-    // At least eight pairs of means.
+    // Requires at least eight pairs of means.
     while known.len() >= 9 * width {
         let pairs = known.len() + 1 - 2 * width;
         let difference = |i: usize| (sums[i + 2 * width] - 2.0 * sums[i + width] + sums[i]) / width as f64;
@@ -194,7 +195,7 @@ fn longest_hold(time_s: &[f64], segments: &[Segment]) -> Option<std::ops::Range<
     holds.max_by(|a, b| duration(time_s, a).total_cmp(&duration(time_s, b))).map(|hold| hold.rows.clone())
 }
 
-/// Returns the relative change from the first tenth of the readings at the least strain to the last.
+/// Returns the relative change of the readings from the first to the last tenth of those near the least strain.
 fn drift(readings: &[f64], reference: Option<&[f64]>) -> Option<f64> {
     let known = reference.map(|reference| reference.iter().copied().filter(|value| !value.is_nan()));
     let range = known.map(extent);

@@ -4,7 +4,7 @@ use crate::counted::counted;
 use crate::import::trace::survey::{ChannelSurvey, ClockSurvey, PhaseSurvey, Survey};
 
 impl Survey {
-    /// Names and sentences, for people. A sentence that goes on with the one before has no name.
+    /// Returns names and sentences for people. A sentence that continues the one before has no name.
     #[must_use]
     pub fn lines(&self) -> Vec<(&'static str, String)> {
         let mut lines = vec![("clock", clock_line(&self.clock)), ("readings", channel_line(&self.readings))];
@@ -82,7 +82,7 @@ fn phases_line(survey: &PhaseSurvey) -> String {
     phases.collect::<Vec<_>>().join(", ")
 }
 
-/// Four digits.
+/// Formats a number with four digits.
 fn number(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();

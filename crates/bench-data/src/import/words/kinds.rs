@@ -1,8 +1,8 @@
-//! Kinds of a quantity that a name tells apart: a resistance or its inverse, a strain or a stretch ratio, a ratio or a change.
+//! Kinds of a quantity that its name distinguishes: a resistance or its inverse, a strain or a stretch ratio, a ratio or a change.
 
 use crate::import::words::names::is_among;
 
-/// A name in lower case, without accents, with plain digits and one kind of delta. Umlauts stay: they are letters.
+/// Converts a name to lower case, without accents, with plain digits and one kind of delta. Umlauts stay: they are letters.
 pub(crate) fn folded(name: &str) -> String {
     const PLAIN: [(&str, char); 9] = [
         ("áàâã", 'a'),
@@ -19,19 +19,19 @@ pub(crate) fn folded(name: &str) -> String {
     name.trim().to_lowercase().chars().map(plain).collect()
 }
 
-/// True if the name of a column means the inverse of a resistance.
+/// True if the name of a column denotes the inverse of a resistance.
 pub(crate) fn is_conductance(name: &str) -> bool {
     let folded = folded(name);
     ["conductanc", "leitwert", "电导", "電導", "컨덕턴스"].iter().any(|part| folded.contains(part))
 }
 
-/// True if a strain's name means a stretch ratio: the length over that at rest.
+/// True if a strain's name denotes a stretch ratio: the length over that at rest.
 pub(crate) fn is_stretch_ratio(name: &str) -> bool {
     let letters: String = folded(name).chars().filter(|c| c.is_alphanumeric()).collect();
     is_among("λ,lambda,stretchratio,stretch", &letters) || letters.contains("stretchratio")
 }
 
-/// True if a name is that of a change relative to the resistance at rest, `dR/R0`, not of a ratio, `R/R0`.
+/// True if a name denotes a change relative to the resistance at rest, `dR/R0`, not a ratio, `R/R0`.
 pub(crate) fn is_change(name: &str) -> bool {
     let folded = folded(name);
     folded.starts_with(['d', 'δ']) || folded.contains("change") || folded.contains("-r0")

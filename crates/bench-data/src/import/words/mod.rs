@@ -1,4 +1,4 @@
-//! Meanings of words, whatever table they stand in: numbers, dates, units, and quantities by name.
+//! Meanings of words in any table: numbers, dates, units, and quantities by name.
 
 pub(crate) mod kinds;
 pub(crate) mod names;

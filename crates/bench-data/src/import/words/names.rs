@@ -2,10 +2,10 @@ use crate::import::words::kinds::{folded, is_conductance};
 use crate::import::words::role::Role;
 use crate::import::words::units;
 
-/// Units that are part of the name behind a blank or an underscore: `resistance_ratio`, `Stage Strain`.
+/// Units that belong to the name after a blank or an underscore: `resistance_ratio`, `Stage Strain`.
 const WORDS: &str = "strain,ratio,fraction,frac,none,code,codes,count,counts,timestamp,datetime,day,days,tage";
 
-/// A heading taken apart: the bare name, and the unit if it has one.
+/// Splits a heading into the bare name and the unit, if it has one.
 pub(crate) fn take_apart(heading: &str) -> (String, Option<String>) {
     let heading = heading.trim();
     for (open, close) in [('(', ')'), ('[', ']'), ('{', '}'), ('<', '>')] {
@@ -18,7 +18,7 @@ pub(crate) fn take_apart(heading: &str) -> (String, Option<String>) {
             return (name.trim().to_owned(), Some(cased(&name, heading[start + open.len_utf8()..end].trim())));
         }
     }
-    // `time_ms`, `R kOhm`, `Time / s`, `Weg, mm`: a unit behind the last mark. `R/R0` is a name.
+    // `time_ms`, `R kOhm`, `Time / s`, `Weg, mm`: the unit is after the last mark. `R/R0` is a name.
     for mark in ['/', ',', '_', ' '] {
         if let Some((name, unit)) = heading.rsplit_once(mark)
             && units::is_unit(unit)
@@ -34,27 +34,27 @@ pub(crate) fn take_apart(heading: &str) -> (String, Option<String>) {
     (heading.to_owned(), None)
 }
 
-/// A unit as it is written; of a conductance with the capital of siemens.
+/// Returns a unit as written; that of a conductance with the capital S of siemens.
 fn cased(name: &str, unit: &str) -> String {
     let is_siemens = is_conductance(name) && matches!(unit.trim_start_matches(['m', 'u', 'µ', 'μ', 'n']), "s" | "S");
     if is_siemens { unit.replace('s', "S") } else { unit.to_owned() }
 }
 
-/// True if a word is one of a list with commas between.
+/// True if a word is in a comma-separated list.
 pub(crate) fn is_among(list: &str, word: &str) -> bool {
     list.split(',').any(|known| known == word)
 }
 
-/// True if a text counts columns of one kind: `strain_1`, `R (2)`.
+/// True if a text numbers columns of one kind: `strain_1`, `R (2)`.
 fn is_index(text: &str) -> bool {
     !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit())
 }
 
-/// Units that are words of names, too: `R_min`, `strain_in`, and every letter.
+/// Units that are also words of names: `R_min`, `strain_in`. So is every letter.
 const SHORT_WORDS: [&str; 4] = ["min", "in", "grad", "day"];
 
-/// True if the text behind a blank or an underscore is a unit, and neither an index nor a part of the name. What may be
-/// either is a unit if the name's quantity is measured in it: `t_s`, `time_min`, `temp_c`; and volts are nothing else.
+/// True if the text after a blank or an underscore is a unit, and neither an index nor a part of the name. An ambiguous text is a unit if
+/// the name's quantity is measured in it: `t_s`, `time_min`, `temp_c`. Volts are never ambiguous.
 fn is_sure_unit(name: &str, unit: &str) -> bool {
     let lower = unit.to_lowercase();
     let is_letter = unit.len() == 1 && unit.starts_with(|c: char| c.is_ascii_alphabetic()) && lower != "v";
@@ -65,16 +65,16 @@ fn is_sure_unit(name: &str, unit: &str) -> bool {
         return true;
     }
     match by_name(name, |_| true).map(|(role, _)| role) {
-        // `R_k`: kiloohms, or one of several.
+        // `R_k` is ambiguous: kiloohms, or one of several.
         Some(Role::Resistance) => false,
-        // `T_C` is a temperature, and no time.
+        // `T_C` is a temperature, not a time.
         Some(Role::Time) if name.trim() == "T" => units::unit(Role::Temperature, unit).is_some(),
         Some(role) => units::unit(role, unit).is_some(),
         None => lower != "k",
     }
 }
 
-/// The end of a name that may be a unit or a part of the name: `res_k`, `strain_p`, `time_m`.
+/// Returns the end of a name that may be a unit or a part of the name: `res_k`, `strain_p`, `time_m`.
 pub(crate) fn doubtful_unit(role: Role, heading: &str) -> Option<&str> {
     const DOUBTFUL: [(Role, &[&str]); 4] = [
         (Role::Time, &["m", "u", "µ", "n"]),
@@ -87,12 +87,12 @@ pub(crate) fn doubtful_unit(role: Role, heading: &str) -> Option<&str> {
     ends.contains(&end.to_lowercase().as_str()).then_some(end)
 }
 
-/// Certainty that a name means a role.
+/// Certainty that a name denotes a role.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Sureness {
-    /// Role by the unit alone, which other columns could have, too.
+    /// Role by the unit alone, which other columns may share.
     Weak,
-    /// Role by the name, except for an index or a short word behind it.
+    /// Role by the name, except for an index or a short word after it.
     Indexed,
     /// Role by the name.
     Strong,
@@ -149,31 +149,31 @@ pub(crate) fn stem(name: &str) -> Vec<String> {
     words
 }
 
-/// Last words of a column that says how uncertain another one is.
+/// Last words of the names of columns that state another column's uncertainty.
 const UNCERTAINTIES: [&str; 10] =
     ["sd", "std", "stdev", "stddev", "sigma", "sem", "err", "error", "unc", "uncertainty"];
 
-/// True if a name is that of another column's uncertainty: `strain_sd`.
+/// True if a name denotes another column's uncertainty: `strain_sd`.
 fn is_uncertainty(name: &str) -> bool {
     let lower = name.to_lowercase();
     let mut words = lower.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty());
     words.next_back().is_some_and(|last| UNCERTAINTIES.contains(&last)) && words.next().is_some()
 }
 
-/// The role that a column's name and unit give it, if any.
+/// Returns the role that a column's name and unit suggest, if any.
 pub(crate) fn role(name: &str, unit: Option<&str>) -> Option<(Role, Sureness)> {
     if is_uncertainty(name) {
         return None;
     }
     let fits = |role: Role| {
-        // A unit of something else, `Position (V)`, takes the role away; no unit, or an unknown one, does not.
+        // A unit of another quantity, `Position (V)`, excludes the role; no unit, or an unknown one, does not.
         unit.is_none_or(|unit| units::unit(role, unit).is_some() || !units::is_unit(unit))
     };
     by_name(name, fits).or_else(|| by_unit(name, unit?))
 }
 
-/// The role that a name has among those that fit: a whole name, a part of one, or a whole one with an index or a short word
-/// behind it.
+/// Returns the role of a name among the fitting ones: by the whole name, a part of it, or the whole name apart from an index or a short
+/// word after it.
 fn by_name(name: &str, fits: impl Fn(Role) -> bool) -> Option<(Role, Sureness)> {
     let lower = folded(name);
     let spaced = lower.replace(['_', '-', '.'], " ");
@@ -186,8 +186,8 @@ fn by_name(name: &str, fits: impl Fn(Role) -> bool) -> Option<(Role, Sureness)> 
     strong.or_else(|| whole(without_index(&lower)?).map(|(role, _)| (*role, Sureness::Indexed)))
 }
 
-/// A name without the index, or the short word, that tells it from others: `R_1`, `R2`, `eps_k`, `R_min`. `R0` is the
-/// resistance at rest; `u_1`, `p1`, `x1` may be anything.
+/// Removes the index, or the short word, that distinguishes a name from others: `R_1`, `R2`, `eps_k`, `R_min`. `R0` is the resistance at
+/// rest; `u_1`, `p1`, `x1` are ambiguous.
 fn without_index(name: &str) -> Option<&str> {
     let (bare, end, letters): (_, _, &[&str]) = match name.rsplit_once(['_', ' ', '-', '.']) {
         Some((bare, end)) => (bare.trim_end_matches('('), end.trim_end_matches(')'), &["r", "t", "x", "d", "e"]),
@@ -202,7 +202,7 @@ fn without_index(name: &str) -> Option<&str> {
     (is_short && is_known && (bare, end) != ("r", "0")).then_some(bare)
 }
 
-/// Ω is measured of the sensor alone; mm, degrees and seconds of many things. `G (mS)` is a conductance.
+/// Returns the role by the unit. Only the sensor is measured in Ω, but many things in mm, degrees and seconds. `G (mS)` is a conductance.
 fn by_unit(name: &str, unit: &str) -> Option<(Role, Sureness)> {
     if units::is_siemens(unit) && is_among("g,gs,gx,gsensor", &folded(name)) {
         return Some((Role::Resistance, Sureness::Strong));

@@ -46,14 +46,14 @@ pub(crate) enum Value {
     Text,
 }
 
-/// Texts that instruments and programs write where there is no value, in lower case, without `+`, `-` and `.`.
+/// Texts for missing values from instruments and programs, in lower case, without `+`, `-` and `.`.
 const MISSING: &str = "nan na n/a #n/a null none nil missing ovld ovl ol 0l overload overld overflow ovrflw ovfl over overrange \
                        outofrange oor under inf infinity ∞ open error err #num! #value! #div/0! #ref! invalid timeout";
 
-/// SCPI instruments answer ±9.9e37 for an overload and 9.91e37 for no number.
+/// Overload of SCPI instruments, which return ±9.9e37 for it and 9.91e37 for NaN.
 pub(crate) const SCPI_OVERLOAD: f64 = 9.9e37;
 
-/// True if a text means that there is no value. `own` are texts that the user calls so.
+/// True if a text denotes a missing value. `own` are the user's texts for that.
 pub(crate) fn is_missing(text: &str, own: &[String]) -> bool {
     let text = text.trim();
     if text.is_empty() || own.iter().any(|own| own == text) {
@@ -83,7 +83,7 @@ pub(crate) fn value(text: &str, mark: DecimalMark, shift: i32, own: &[String]) -
     }
 }
 
-/// A number times 10^`shift`, rounded once.
+/// Returns a number times 10^`shift`, rounded once.
 pub(crate) fn number(text: &str, mark: DecimalMark, shift: i32) -> Option<f64> {
     let plain = plain(text.trim(), mark)?;
     if shift == 0 {
@@ -96,8 +96,8 @@ pub(crate) fn number(text: &str, mark: DecimalMark, shift: i32) -> Option<f64> {
     format!("{mantissa}e{}", exponent.checked_add(shift)?).parse().ok()
 }
 
-/// A number times 10^`shift` as a whole number of nanoseconds, exactly; digits behind these are dropped. `None` if it is too
-/// large, or has an exponent.
+/// Returns a number times 10^`shift` as a whole number of nanoseconds, exactly; further digits are dropped. `None` if it is too large, or
+/// has an exponent.
 pub(crate) fn nanoseconds(text: &str, mark: DecimalMark, shift: i32) -> Option<i128> {
     let plain = plain(text.trim(), mark)?;
     let (sign, digits) = plain.strip_prefix('-').map_or((1, plain.trim_start_matches('+')), |digits| (-1, digits));
@@ -107,7 +107,7 @@ pub(crate) fn nanoseconds(text: &str, mark: DecimalMark, shift: i32) -> Option<i
     (whole.len() + behind < 36).then(|| format!("{whole}{fraction}").parse::<i128>().ok().map(|count| sign * count))?
 }
 
-/// A number as Rust writes it: a point, no thousands; `None` for what is no number.
+/// Converts a number to Rust's notation, with a point and without thousands marks; `None` if the text is not a number.
 fn plain(text: &str, mark: DecimalMark) -> Option<std::borrow::Cow<'_, str>> {
     if !text.bytes().any(|byte| byte.is_ascii_digit()) {
         return None;
@@ -130,7 +130,7 @@ fn plain(text: &str, mark: DecimalMark) -> Option<std::borrow::Cow<'_, str>> {
     })
 }
 
-/// Digits without the marks that group thousands.
+/// Removes the marks that group thousands.
 fn ungrouped(whole: &str, mark: DecimalMark) -> Option<String> {
     if whole.bytes().all(|byte| byte.is_ascii_digit()) {
         return Some(whole.to_owned());
@@ -149,7 +149,7 @@ fn ungrouped(whole: &str, mark: DecimalMark) -> Option<String> {
     parts.try_fold(first.to_owned(), |whole, part| (part.len() == 3 && is_digits(part)).then(|| whole + part))
 }
 
-/// True if a number has marks that group thousands if `mark` is the decimal mark.
+/// True if a number contains marks that group thousands, given the decimal mark `mark`.
 pub(crate) fn has_groups(text: &str, mark: DecimalMark) -> bool {
     let other = if mark == DecimalMark::Point { ',' } else { '.' };
     text.contains(other) && number(text, mark, 0).is_some()

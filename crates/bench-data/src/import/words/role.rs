@@ -4,13 +4,13 @@ use std::str::FromStr;
 /// Role of a column in a trace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Role {
-    /// Time of the readings, and of all else in the same file unless it has a clock of its own.
+    /// Time of the readings, and of all other columns in the same file without a clock of their own.
     Time,
     /// Time of the reference.
     ReferenceTime,
     /// Resistance.
     Resistance,
-    /// Resistance over resistance at rest, or its change.
+    /// Resistance over the resistance at rest, or its change.
     Ratio,
     /// Converter codes.
     Adc,
@@ -56,7 +56,7 @@ impl Role {
         }
     }
 
-    /// Roles that share their units.
+    /// Returns the role that represents all roles with the same units.
     pub(crate) const fn quantity(self) -> Self {
         match self {
             Self::ReferenceTime => Self::Time,

@@ -17,7 +17,7 @@ pub(crate) enum Order {
 impl Order {
     pub(crate) const ALL: [Self; 3] = [Self::Iso, Self::Dmy, Self::Mdy];
 
-    /// The name of such dates among units of time.
+    /// Returns the name of such dates among the units of time.
     pub(crate) const fn unit(self) -> &'static str {
         match self {
             Self::Iso => "iso",
@@ -30,13 +30,13 @@ impl Order {
 /// A text with a date, a time of day or both.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Stamp {
-    /// Nanoseconds since a fixed day, or since midnight if there is no date; UTC where the text has an offset.
+    /// Nanoseconds since a fixed day, or since midnight if there is no date; UTC if the text has an offset.
     pub nanoseconds: i128,
     pub has_date: bool,
     pub has_time: bool,
 }
 
-/// Labels of whole and of fractional seconds, and the digits of the fraction.
+/// Labels of whole and of fractional seconds, and the number of digits of the fraction.
 pub(crate) const SPLIT_SECONDS: [(&str, &str, usize); 9] = [
     ("sec", "nanosec", 9),
     ("sec", "nsec", 9),
@@ -49,7 +49,7 @@ pub(crate) const SPLIT_SECONDS: [(&str, &str, usize); 9] = [
     ("seconds", "microseconds", 6),
 ];
 
-/// Reads a date, a time of day or both. No month is a word here, so that no language is meant.
+/// Reads a date, a time of day or both. Names of months are not supported, so that no language is preferred.
 pub(crate) fn stamp(text: &str, order: Order) -> Option<Stamp> {
     let text = text.trim();
     if !may_be_stamp(text.as_bytes()) {
@@ -67,16 +67,16 @@ pub(crate) fn stamp(text: &str, order: Order) -> Option<Stamp> {
     Some(Stamp { nanoseconds: days * DAY + seconds, has_date: date.is_some(), has_time: time.is_some() })
 }
 
-/// True if a text begins with a digit and has what dates or times of day have: two marks between the parts of a date, or what
-/// stands in or before a time of day. Most cells are numbers, and are told from these by one look.
+/// True if a text begins with a digit and contains characters of dates or times of day: two marks between the parts of a date, or a mark
+/// within or before a time of day. Most cells are numbers; this check rejects them quickly.
 fn may_be_stamp(text: &[u8]) -> bool {
     let marks = || text.iter().filter(|byte| matches!(byte, b'-' | b'/' | b'.')).count();
     let has_time = || text.iter().any(|byte| matches!(byte, b':' | b'_' | b'T' | b' '));
     text.first().is_some_and(u8::is_ascii_digit) && (marks() >= 2 || has_time())
 }
 
-/// The date and the time of day of a text, of which one may be missing: `2024-05-01 10:30`, `2024/05/01/10:30`,
-/// `2024-05-01-10:30`, `2024-05-01_10-30-00`.
+/// Returns the date and the time of day of a text, one of which may be missing: `2024-05-01 10:30`, `2024/05/01/10:30`, `2024-05-01-10:30`,
+/// `2024-05-01_10-30-00`.
 pub(crate) fn date_and_time(text: &str) -> (Option<&str>, Option<&str>) {
     match text.trim().split_once(['T', ' ', '_']) {
         Some((date, time)) if !date.contains(':') => (Some(date), Some(time)),
@@ -110,9 +110,8 @@ fn days(date: &str, order: Order) -> Option<i32> {
     (year >= 1000).then(|| NaiveDate::from_ymd_opt(year as i32, month, day))?.map(|date| date.num_days_from_ce())
 }
 
-/// `12:30:01.25`, `12:30:01:250`, `12:30`, `1:30:01 PM`, `12:30:01+02:00`, `12:30:01Z`; nanoseconds since midnight UTC.
-/// `01:30.5` is what spreadsheets write of minutes and seconds.
-/// `12-30-01` and `123001` are what names of files have.
+/// Reads `12:30:01.25`, `12:30:01:250`, `12:30`, `1:30:01 PM`, `12:30:01+02:00`, `12:30:01Z`; returns nanoseconds since midnight UTC.
+/// Spreadsheets write minutes and seconds as `01:30.5`. File names contain `12-30-01` and `123001`.
 fn time_of_day(time: &str) -> Option<i128> {
     let as_in_names = in_a_name(time);
     let time = as_in_names.as_deref().unwrap_or(time);
@@ -146,7 +145,7 @@ fn time_of_day(time: &str) -> Option<i128> {
     Some((hours * 60 + minutes - zone) * 60 * SECOND + nanoseconds)
 }
 
-/// A time of day without colons, with them.
+/// Adds colons to a time of day without them.
 fn in_a_name(time: &str) -> Option<String> {
     let (clock, fraction) = time.split_at(time.find('.').unwrap_or(time.len()));
     let is_digits = |part: &&str| part.len() == 2 && part.bytes().all(|byte| byte.is_ascii_digit());
@@ -158,7 +157,7 @@ fn in_a_name(time: &str) -> Option<String> {
     parts.iter().all(is_digits).then(|| parts.join(":") + fraction)
 }
 
-/// Minutes east of Greenwich.
+/// Returns minutes east of Greenwich.
 fn zone(text: &str) -> Option<i128> {
     if text == "Z" {
         return Some(0);
@@ -187,7 +186,7 @@ pub(crate) fn is_stamp(text: &str) -> bool {
     Order::ALL.into_iter().any(|order| stamp(text, order).is_some())
 }
 
-/// The orders in which all cells are dates or times of day; none if some are not.
+/// Returns the orders in which all cells are dates or times of day; none if some are not.
 pub(crate) fn orders<'a>(cells: impl Iterator<Item = &'a str> + Clone) -> Vec<Order> {
     let all = |order: &Order| {
         let mut filled = cells.clone().filter(|cell| !cell.trim().is_empty()).peekable();
@@ -196,12 +195,12 @@ pub(crate) fn orders<'a>(cells: impl Iterator<Item = &'a str> + Clone) -> Vec<Or
     Order::ALL.into_iter().filter(all).collect()
 }
 
-/// True if the parts of dates stand apart by points, as in countries where the day comes first.
+/// True if the parts of a date are separated by points, as in countries where the day comes first.
 pub(crate) fn has_points(text: &str) -> bool {
     date_and_time(text).0.is_some_and(|date| date.matches('.').count() == 2)
 }
 
-/// Times of day that pass midnight go on.
+/// Continues times of day past midnight.
 pub(crate) fn past_midnight(stamps: &mut [Option<i128>]) {
     let (mut days, mut last) = (0, None);
     for stamp in stamps.iter_mut().flatten() {

@@ -2,18 +2,18 @@ use crate::import::words::number::{DecimalMark, Value, number, value};
 use crate::import::words::role::Role;
 use crate::metadata::{ResistanceUnit, StrainUnit};
 
-/// Conversion of numbers in a unit to numbers of the trace.
+/// Conversion of numbers in a unit to the trace's unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Scale {
-    /// Times a power of ten: the decimal mark moves, nothing is rounded.
+    /// Multiplication by a power of ten: the decimal mark moves, nothing is rounded.
     Shift(i32),
-    /// Times a factor, plus an offset.
+    /// Multiplication by a factor, plus an offset.
     Affine(f64, f64),
-    /// One over the number shifted like `Shift`: a conductance.
+    /// Inverse of the number shifted like `Shift`: a conductance.
     Inverse(i32),
     /// The number shifted like `Shift`, plus one: changes relative to the resistance at rest.
     ChangeShift(i32),
-    /// Text that is a date or a time of day.
+    /// Text with a date or a time of day.
     Stamp,
 }
 
@@ -27,7 +27,7 @@ impl Scale {
     }
 }
 
-/// A unit, under the name that flags give it.
+/// A unit with its name in flags.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Unit {
     pub name: &'static str,
@@ -78,12 +78,12 @@ const UNITS: &[Entry] = &[
     (Role::Temperature, "fahrenheit", Scale::Affine(5.0 / 9.0, -160.0 / 9.0), &["°f", "f", "degf"]),
 ];
 
-/// A text without the brackets around it.
+/// Removes the brackets around a text.
 fn bare(text: &str) -> &str {
     text.trim().trim_matches(['(', ')', '[', ']', '{', '}', '<', '>']).trim()
 }
 
-/// The unit of a quantity that a text spells.
+/// Returns the unit of a quantity with this spelling.
 pub(crate) fn unit(role: Role, text: &str) -> Option<Unit> {
     let text = bare(text).replace('\u{2126}', "Ω");
     let lower = text.to_lowercase();
@@ -98,7 +98,7 @@ pub(crate) fn unit(role: Role, text: &str) -> Option<Unit> {
 }
 
 impl Role {
-    /// Names of its units, as flags have them; none of a role whose numbers have no unit.
+    /// Returns the names of its units in flags; none for a role whose numbers have no unit.
     #[must_use]
     pub fn units(self) -> Vec<&'static str> {
         names(self)
@@ -106,7 +106,7 @@ impl Role {
 }
 
 impl StrainUnit {
-    /// The unit that a text spells as in a lab's file: `percent`, `%`, `fraction`, `mm/mm`. `None` of every other unit.
+    /// Returns the unit with a spelling from a lab's file: `percent`, `%`, `fraction`, `mm/mm`. `None` for any other unit.
     #[must_use]
     pub fn spelled(text: &str) -> Option<Self> {
         match unit(Role::Strain, text)?.name {
@@ -118,7 +118,7 @@ impl StrainUnit {
 }
 
 impl ResistanceUnit {
-    /// The unit that a text spells as in a lab's file: `ohm`, `kΩ`, `kOhm`. `None` of every other unit.
+    /// Returns the unit with a spelling from a lab's file: `ohm`, `kΩ`, `kOhm`. `None` for any other unit.
     #[must_use]
     pub fn spelled(text: &str) -> Option<Self> {
         match unit(Role::Resistance, text)?.name {
@@ -129,8 +129,7 @@ impl ResistanceUnit {
     }
 }
 
-/// Ohms of a number with a prefix or a unit behind it, as instruments with ranges of their own write them: `1.28k`,
-/// `980.1 Ω`.
+/// Returns the ohms of a number followed by a prefix or a unit, as instruments with automatic ranges write them: `1.28k`, `980.1 Ω`.
 pub(crate) fn ohms(text: &str, mark: DecimalMark) -> Option<f64> {
     let end = text.rfind(|c: char| c.is_ascii_digit() || c == mark.character())? + 1;
     let shift = match text[end..].trim() {
@@ -147,7 +146,7 @@ pub(crate) fn ohms(text: &str, mark: DecimalMark) -> Option<f64> {
     number(text[..end].trim(), mark, shift)
 }
 
-/// Returns the value of a text, in which ohms may have a prefix.
+/// Returns the value of a text; ohms may have a prefix.
 pub(crate) fn amount(cell: &str, mark: DecimalMark) -> Value {
     match value(cell, mark, 0, &[]) {
         Value::Text => ohms(cell, mark).map_or(Value::Text, Value::Number),
@@ -155,10 +154,10 @@ pub(crate) fn amount(cell: &str, mark: DecimalMark) -> Value {
     }
 }
 
-/// The name of units that have none.
+/// Name of units without a name of their own.
 pub(crate) const SCALED: &str = "scaled";
 
-/// A unit, or so much of one per unit of what the column has: `inch`, `4mm/V`, `-0.9deg/step`, `0.1ms`.
+/// Returns a unit, or a multiple of one per unit of the column: `inch`, `4mm/V`, `-0.9deg/step`, `0.1ms`.
 pub(crate) fn unit_or_scale(role: Role, text: &str) -> Option<Unit> {
     if let Some(unit) = unit(role, text) {
         return Some(unit);
@@ -187,12 +186,12 @@ pub(crate) const fn scale_of_a_reference(role: Role) -> Option<&'static str> {
     }
 }
 
-/// True if a text is a unit of conductance, as it is written.
+/// True if a text is a unit of conductance with the case as written.
 pub(crate) fn is_siemens(text: &str) -> bool {
     unit(Role::Resistance, text).is_some_and(|unit| matches!(unit.scale, Scale::Inverse(_)))
 }
 
-/// The quantities in which a text is a unit.
+/// Returns the quantities for which a text is a unit.
 pub(crate) fn quantities(text: &str) -> Vec<Role> {
     let mut roles: Vec<Role> = Vec::new();
     for (role, ..) in UNITS {
@@ -213,8 +212,8 @@ pub(crate) fn is_unit(text: &str) -> bool {
     !quantities(bare).is_empty() || OTHER.contains(&bare.to_lowercase().as_str())
 }
 
-/// The unit in which a count is a time since 1970, of this century, and a step from row to row is none of minutes: `us` of
-/// 1.7e15. Counts since a device was started are smaller, or have larger steps.
+/// Returns the unit in which a count is a time since 1970, within this century, with steps of at most some seconds from row to row: `us`
+/// for 1.7e15. Counts since the start of a device are smaller, or have larger steps.
 pub(crate) fn epoch_unit(count: f64, step: f64) -> Option<&'static str> {
     const CENTURY_S: std::ops::Range<f64> = 9.46e8..4.1e9;
     const LONGEST_STEP_S: f64 = 10.0;
@@ -224,7 +223,7 @@ pub(crate) fn epoch_unit(count: f64, step: f64) -> Option<&'static str> {
     [("s", 1.0), ("ms", 1e3), ("us", 1e6), ("ns", 1e9)].iter().find(fits).map(|(name, _)| *name)
 }
 
-/// Names of a quantity's units, for answers.
+/// Returns the names of a quantity's units, for answers.
 pub(crate) fn names(role: Role) -> Vec<&'static str> {
     UNITS.iter().filter(|(of, ..)| *of == role.quantity()).map(|(_, name, ..)| *name).collect()
 }

@@ -1,4 +1,4 @@
-//! The lag by the law: where a recording is long enough for that.
+//! Estimates the lag by the law, if the recording is long enough.
 
 use nalgebra::DVector;
 
@@ -16,52 +16,52 @@ use super::{FARTHEST_S, Lag, LagError, SURE, aligned};
 struct Lags {
     /// Middle of the lags tried, s.
     around_s: f64,
-    /// Lags tried reach this far to both sides, s.
+    /// Distance to which lags are tried on both sides, s.
     reach_s: f64,
-    /// Lags tried to each side.
+    /// Number of lags tried to each side.
     steps: u32,
-    /// Rows kept of the recording.
+    /// Largest number of rows kept.
     rows: usize,
 }
 
-/// The first look, as far as a reference is late or early where clocks were started by hand.
+/// Coarse search, over the offsets of clocks that are started by hand.
 const FAR: Lags = Lags { around_s: 0.0, reach_s: FARTHEST_S, steps: 24, rows: 1500 };
-/// The second look, around what the first one has found.
+/// Fine search, around the result of the coarse one.
 const NEAR: Lags = Lags { around_s: 0.0, reach_s: 1.0, steps: 20, rows: 6000 };
-/// Movements that repeat look alike one period later: of lags about as good as the best one, in squared error, the
-/// smallest is taken.
+/// Ratio of squared errors up to which a lag counts as good as the best one; the smallest such lag is chosen, because periodic movements
+/// look alike one period later.
 const AS_GOOD: f64 = 1.2;
-/// Largest unexplained share of the readings' changes with which a gauge alone is used, where a body does not rest: a law with
-/// branches takes a lag for relaxation in slow and even motion, and half a period for another part of it. Public recordings of
-/// movements leave 0.03 to 0.2. In holds the law sees relaxation by itself, and a gauge takes it for a lag, with gains of up to 55.
+/// Largest unexplained fraction of the readings' changes with which a gauge alone is used, if the body does not rest. In slow, even motion,
+/// a law with branches mistakes a lag for relaxation, and half a period for another part of it. Public recordings of movements leave 0.03
+/// to 0.2. In holds the law identifies relaxation, which a gauge mistakes for a lag, with gains of up to 55.
 const OF_GAUGE: f64 = 0.3;
-/// A sensor's own hysteresis lags behind the strain, which a gauge takes for an early reference: by up to this share of a movement.
+/// Largest own lag of a sensor behind the strain, by its hysteresis, in movements. A gauge takes it for an early reference.
 const OWN_SHARE: f64 = 0.1;
 /// Ridge of the law, in the middle of those that calibration tries.
 const RIDGE: f64 = 0.01;
-/// Gain from which on there is hardly a doubt. Of 1440 simulated recordings as they are, whole, halves and thirds, 43 show a lag of more
-/// than a tenth of a movement with a gain of [`SURE`] (in three movements between long holds up to 5.5, by a gauge up to 4.6), four with
-/// this one (halves with sines of a sensor with much hysteresis). Of public recordings, whole to quarters, none shows more than 3.2.
+/// Gain beyond which a lag is practically certain. Of 1440 simulated recordings as they are, whole, halves and thirds, 43 show a lag of
+/// more than a tenth of a movement with a gain of [`SURE`] (in three movements between long holds up to 5.5, by a gauge up to 4.6), four
+/// with this gain (halves with sines of a sensor with much hysteresis). Of public recordings, whole to quarters, none shows more than 3.2.
 const CERTAIN: f64 = 6.0;
-/// Share of the readings' mean square that a law with a ridge leaves even if it is the sensor's: less is as good. Half a period late one
-/// part of a sine is explained by another, and no worse. Public recordings leave 0.006 and more.
+/// Fraction of the readings' mean square below which errors count as equal: a law with a ridge leaves this much even if it is the sensor's
+/// own. At half a period, one part of a sine explains another, and no worse. Public recordings leave 0.006 and more.
 const EXPLAINED: f64 = 1e-3;
-/// Dash-pots: the two columns between gauge and branches.
+/// Number of dash-pot columns, between gauge and branches.
 const DASH_POTS: usize = 2;
-/// Coefficients of the polynomial gauge.
+/// Number of coefficients of the polynomial gauge.
 const GAUGE: usize = 3;
 
-/// Lag of a reference by the law.
+/// Estimates the lag of a reference by the law.
 ///
-/// The lag, within ±12 s if it is [sure](Lag::is_sure) and ±1 s if not, at which a law with two branches, a cubic gauge and no
-/// dash-pots explains the readings best, on blocks left out. Law and readings are compared through a high-pass as long as the lags
-/// reach: a lag shows where the movement changes, and slow errors of the law, which are larger, would move it by half a
-/// second and more. A dash-pot is left out because it looks like a lag: what a sensor has of one is part of the answer. A
-/// movement that repeats cannot tell a lag from one that is a period longer; the smaller one is given.
+/// The result is the lag, within ±12 s if it is [sure](Lag::is_sure) and ±1 s if not, at which a law with two branches, a cubic gauge and
+/// no dash-pots best explains the readings, on held-out blocks. Law and readings are compared after a high-pass whose time constant is the
+/// range of the lags: a lag shows where the movement changes, whereas slow errors of the law, which are larger, would move it by half a
+/// second and more. A dash-pot is left out because it looks like a lag, so a sensor's own dash-pot is part of the result. A periodic
+/// movement cannot separate a lag from one that is a period longer; the smaller one is returned.
 ///
-/// The gauge alone is used besides, over ±12 s, where a body does not rest and the gauge explains most of the changes: it does not
-/// take a lag for relaxation, but cannot know the sensor's own lag. If it contradicts the lag of the law, that lag is discarded. Its own
-/// lag, in the middle of the range it leaves open, is accepted from 0.15 movements on.
+/// The gauge alone is used as well, over ±12 s, if the body does not rest and the gauge explains most of the changes. It does not mistake a
+/// lag for relaxation, but cannot separate the sensor's own lag. If it contradicts the lag of the law, that lag is discarded. Its own lag,
+/// in the middle of the range that remains possible, is accepted from 0.15 movements on.
 pub(super) fn lag_by_law(samples: &Samples) -> Result<Lag, LagError> {
     let errors = errors(samples, FAR).ok_or(LagError::Short)?;
     match by_law_and_gauge(samples, &errors) {
@@ -84,7 +84,7 @@ fn by_law_and_gauge(samples: &Samples, errors: &Errors) -> Option<Lag> {
     }
 }
 
-/// Lag by the gauge alone, where it is sure of more than the sensor's own.
+/// Returns the lag by the gauge alone, if it is sure and larger than a sensor's own.
 fn of_gauge(errors: &[f64], movement_s: f64) -> Option<Lag> {
     let (lag_s, error) = best_lag(errors, FAR)?;
     let own_s = 0.5 * OWN_SHARE * movement_s;
@@ -93,7 +93,7 @@ fn of_gauge(errors: &[f64], movement_s: f64) -> Option<Lag> {
     (lag.is_sure() && lag.lag_s.abs() > 3.0 * own_s).then_some(lag)
 }
 
-/// True if the gauge's errors are much larger around this lag, and earlier by what may be the sensor's own, than elsewhere.
+/// True if the gauge's errors around this lag, extended by the sensor's possible own lag, are much larger than elsewhere.
 fn contradicts(errors: &[f64], lag: &Lag) -> bool {
     let (first_s, last_s) =
         (lag.lag_s - OWN_SHARE * lag.movement_s - 1.5 * FAR.step_s(), lag.lag_s + 1.5 * FAR.step_s());
@@ -101,8 +101,8 @@ fn contradicts(errors: &[f64], lag: &Lag) -> bool {
     near.fold(f64::INFINITY, f64::min) > SURE * least(errors).max(EXPLAINED)
 }
 
-/// The end of the lags that are looked for, s (negative: the reference is early), if the readings are explained best there, and
-/// surely better than without a lag: the clocks are further apart than that.
+/// Returns the end of the searched range, s (negative: the reference is early), if the readings are explained best there, and surely better
+/// than without a lag; the clocks then differ by more than that.
 fn out_of_reach(errors: &[f64]) -> Option<f64> {
     let least = least(errors);
     let is_sure = *errors.get(FAR.steps as usize)? >= SURE * least.max(EXPLAINED);
@@ -114,7 +114,7 @@ fn out_of_reach(errors: &[f64]) -> Option<f64> {
     }
 }
 
-/// The best lag near `around_s`.
+/// Returns the best lag near `around_s`.
 fn examined(samples: &Samples, around_s: f64) -> Option<Lag> {
     let search = Lags { around_s, ..NEAR };
     let (lag_s, least) = best_lag(&errors(samples, search)?.law, search)?;
@@ -123,7 +123,7 @@ fn examined(samples: &Samples, around_s: f64) -> Option<Lag> {
     Some(lag_of(lag_s, 0.0, search, movement_s, now / least.max(EXPLAINED), least))
 }
 
-/// A lag between those tried: it is good to half a step.
+/// Returns a lag with a standard deviation of half a step of the search.
 fn lag_of(lag_s: f64, own_s: f64, search: Lags, movement_s: f64, gain: f64, unexplained: f64) -> Lag {
     let sd_s = 0.5 * search.step_s();
     Lag { lag_s, sd_s, own_s, movement_s, gain, unexplained, certain: gain >= CERTAIN }
@@ -133,7 +133,7 @@ fn least(errors: &[f64]) -> f64 {
     errors.iter().copied().fold(f64::INFINITY, f64::min)
 }
 
-/// The best lag of a search, between those tried, and its error; `None` if it lies at an end.
+/// Returns the best lag of a search, interpolated, and its error; `None` if it is at an end.
 fn best_lag(errors: &[f64], search: Lags) -> Option<(f64, f64)> {
     let least = least(errors);
     let is_valley =
@@ -144,7 +144,7 @@ fn best_lag(errors: &[f64], search: Lags) -> Option<(f64, f64)> {
         size(*a).total_cmp(&size(*b))
     })?;
     let (before, after) = (errors.get(best.checked_sub(1)?)?, errors.get(best + 1)?);
-    // The minimum of the parabola through the best lag and its neighbours.
+    // Minimum of the parabola through the best lag and its neighbours.
     let curvature = before - 2.0 * errors[best] + after;
     let offset = if curvature > 0.0 { 0.5 * (before - after) / curvature } else { 0.0 };
     Some((search.around_s + search.offset_s(best) + offset * search.step_s(), errors[best]))
@@ -177,11 +177,11 @@ impl Lags {
     }
 }
 
-/// Squared error of the law, and of its gauge alone, on blocks left out, as a share of the readings' mean square, all behind the
-/// high-pass, if the reference is read `lag_s` later.
+/// Returns the squared error of the law, and of its gauge alone, on held-out blocks, relative to the readings' mean square. Both are
+/// high-passed, and the reference is read `lag_s` later.
 fn left_out_errors(samples: &Samples, lag_s: f64, search: Lags) -> Option<[f64; 2]> {
     let strain = aligned(samples, lag_s);
-    // Every lag is judged by the same rows: those that have a reference within reach on both sides.
+    // All lags are judged on the same rows: those with a reference within reach on both sides.
     let reach_s = search.around_s.abs() + search.reach_s;
     let (first_s, last_s) = (samples.time_s.first()? + reach_s, samples.time_s.last()? - reach_s);
     let stride = samples.len().div_ceil(search.rows);
@@ -201,12 +201,12 @@ fn left_out_errors(samples: &Samples, lag_s: f64, search: Lags) -> Option<[f64; 
     let times: Vec<f64> = regression.recordings[0].complete.iter().map(|&k| time_s[k]).collect();
     let rest_readings = regression.median_readings();
     let response = regression.response(&rest_readings);
-    // As long as the lags reach from one side to the other.
+    // The time constant is the full range of the lags.
     let high_pass = |column: &DVector<f64>| high_pass(&times, column, 2.0 * search.reach_s);
     let changes = high_pass(&response);
     let mean_square = changes.norm_squared() / changes.len() as f64;
     design.offset = &response - changes;
-    // The constant stays: it is the regression's own.
+    // The constant is not filtered: it belongs to the regression.
     for column in design.columns.iter_mut().skip(1) {
         *column = high_pass(column);
     }
@@ -217,7 +217,7 @@ fn left_out_errors(samples: &Samples, lag_s: f64, search: Lags) -> Option<[f64; 
     Some([error(&with_branches)?, error(&with_branches[..=GAUGE])?])
 }
 
-/// High-pass of a column with time constant `tau_s`.
+/// Applies a high-pass with time constant `tau_s` to a column.
 fn high_pass(time_s: &[f64], column: &DVector<f64>, tau_s: f64) -> DVector<f64> {
     let mut low_pass = LowPass::new(tau_s);
     DVector::from_iterator(

@@ -1,4 +1,4 @@
-//! The lag of a reference behind the readings: the one estimate of it, for one clock and for two.
+//! The lag of a reference behind the readings: the only estimate of it, for one clock and for two.
 
 mod law;
 mod motion;
@@ -14,69 +14,69 @@ use crate::samples::Samples;
 use law::lag_by_law;
 use search::Search;
 
-/// Lags of a reference on the readings' clock are looked for this far, s: as far as devices started by hand are apart.
+/// Largest lag of a reference on the readings' clock that is searched, s: the largest offset between devices started by hand.
 const FARTHEST_S: f64 = 12.0;
-/// Length of a recording, in multiples of the farthest lag, from which on the law tells the lag: it knows relaxation, and needs
-/// readings with a reference on both sides of all lags. In shorter ones it takes one movement for another, and only the motion is used.
+/// Least length of a recording, in multiples of the largest lag, for an estimate by the law. The law includes relaxation, and needs
+/// readings with a reference on both sides of all lags. In shorter recordings it confuses movements, and only the motion is used.
 const LONG: f64 = 10.0;
-/// Factor by which a lag has to lower the squared error to be reported. Of 104 public recordings as they are, parts of 15 s and more
-/// among them, two show as much.
+/// Factor by which a lag must lower the squared error to be reported. Of 104 public recordings as they are, parts of 15 s and more among
+/// them, two reach it.
 const SURE: f64 = 2.5;
-/// Gain from which on there is hardly a doubt, if the motion explains the readings and the lag is more than a sensor's own: none of
-/// those 104, and of 311 simulated ones, shows all three …
+/// Gain beyond which a lag is practically certain, if the motion explains the readings and the lag exceeds a sensor's own: none of those
+/// 104 recordings, and of 311 simulated ones, meets all three conditions.
 const CERTAIN: f64 = 6.0;
-/// … but for this share of their variance, at most.
+/// Largest unexplained fraction of the readings' variance at which the motion counts as explaining them.
 const WELL_EXPLAINED: f64 = 0.3;
-/// A sensor's own hysteresis looks like a lag. Standard deviation of that as a share of a movement: of eight public recordings
-/// of one rig it is -0.10 to 0.09.
+/// Standard deviation of a sensor's own lag, which looks like one of the reference, in movements. In eight public recordings of one rig,
+/// hysteresis gives -0.10 to 0.09.
 const OWN_SHARE: f64 = 0.05;
-/// A lag of more than this share of a movement turns stretching into releasing for that share of the time.
+/// Lag, in movements, above which a reference is too late: for that fraction of the time, stretching counts as releasing.
 const LARGEST_SHARE: f64 = 0.1;
-/// Standard deviations that a lag must differ from zero by.
+/// Least number of standard deviations by which a lag must differ from zero.
 const SIGNIFICANT: f64 = 3.0;
 
 /// Lag of a reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lag {
-    /// Positive if what the reading shows now stands in the reference later, s.
+    /// Lag, s; positive if the reference shows later what the reading shows now.
     pub lag_s: f64,
-    /// Standard deviation, s: from leaving out a tenth of the rows at a time and from what counts as slow, or of the lags that were
-    /// tried.
+    /// Standard deviation, s: from leaving out a tenth of the rows at a time and from the choice of the high-pass, or from the spacing of
+    /// the lags tried.
     pub sd_s: f64,
-    /// Standard deviation of the lag that the sensor itself may have, which cannot be told apart from the reference's, s.
+    /// Standard deviation of the sensor's own lag, s, which cannot be separated from that of the reference.
     pub own_s: f64,
     /// Duration of a movement, s.
     pub movement_s: f64,
-    /// Squared error on blocks left out without the lag, over that with it.
+    /// Squared error on held-out blocks without the lag, over that with it.
     pub gain: f64,
-    /// Share of the readings' variance that stays unexplained at this lag.
+    /// Fraction of the readings' variance that is unexplained at this lag.
     pub unexplained: f64,
-    /// True if hardly any recording that is on time looks like that.
+    /// True if hardly any recording without a lag shows one like this.
     pub(crate) certain: bool,
 }
 
 impl Lag {
-    /// True if the readings are explained so much better with the lag that it is worth saying.
+    /// True if the lag explains the readings so much better that it should be reported.
     #[must_use]
     pub fn is_sure(&self) -> bool {
         self.gain >= SURE
     }
 
-    /// True if hardly any recording that is on time looks like that.
+    /// True if hardly any recording without a lag shows one like this.
     #[must_use]
     pub const fn is_certain(&self) -> bool {
         self.certain
     }
 
-    /// True if the lag is more than a tenth of a movement: such a recording, if that [is certain](Self::is_certain), is not to be
-    /// calibrated on as it is.
+    /// True if the lag is more than a tenth of a movement. If it [is also certain](Self::is_certain), the recording must not be used for
+    /// calibration as it is.
     #[must_use]
     pub fn is_too_late(&self) -> bool {
         self.lag_s.abs() > LARGEST_SHARE * self.movement_s && self.lag_s.abs() > SIGNIFICANT * self.sd_s
     }
 }
 
-/// `2.00 ± 0.05 s late`, what the sensor itself may lag included in the standard deviation.
+/// Writes for example `2.00 ± 0.05 s late`; the standard deviation includes the sensor's own lag.
 impl fmt::Display for Lag {
     fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
         let word = if self.lag_s < 0.0 { "early" } else { "late" };
@@ -84,20 +84,20 @@ impl fmt::Display for Lag {
     }
 }
 
-/// Reason why the motion does not tell a lag.
+/// Reason why the motion does not determine a lag.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum LagError {
     /// No lag explains the readings best.
     #[error("the readings do not tell")]
     Untold,
-    /// Too little of either.
+    /// Too few readings or reference values, or no motion.
     #[error("too few rows with readings or reference, or no motion")]
     Short,
     /// The reference explains too little of the readings.
     #[error("the motion does not show in the readings ({:.0} % of their variance stays unexplained at best)", 100.0 * .0.min(1.0))]
     Unseen(f64),
-    /// The best lag, s, is the largest one tried.
+    /// The best lag, s, is at an end of those tried.
     #[error("the best offset, {0:.3} s, is the farthest that was tried")]
     AtEnd(f64),
     /// The motion repeats: two lags, s, the better one first.
@@ -108,18 +108,17 @@ pub enum LagError {
 /// Finds the lag of a reference on the readings' clock, within ±12 s.
 ///
 /// In recordings of two minutes and more it is the lag at which a law with two branches explains the readings best, on held-out blocks. In
-/// shorter ones, at each lag the readings are regressed on the reference there: its first three powers, and its movements,
-/// with and without their sign, through low-passes of one and eight times the time of a full stretch. Changes slower than two
-/// full stretches are taken out of both sides. A lag is judged by readings that are left out of the regression, and rows that it
-/// leaves without a reference count as unexplained. Zero is returned unless the readings speak against a reference
-/// on time. Rows that calibration does not believe take no part.
+/// shorter ones, the readings are regressed, at each lag, on the reference: its first three powers, and its movements, with and without
+/// their sign, through low-passes of one and eight times the time of a full stretch. Changes slower than two full stretches are removed
+/// from both sides. A lag is judged by readings that are left out of the regression; rows that it leaves without a reference count as
+/// unexplained. Zero is returned unless the readings contradict a reference on time. Rows that calibration distrusts are left out.
 ///
 /// # Errors
-/// [`LagError`] if the motion does not tell.
+/// [`LagError`] if the motion does not determine a lag.
 pub fn reference_lag(samples: &Samples) -> Result<Lag, LagError> {
     match screen(&[*samples]) {
         Ok(screened) => screened.samples().first().map_or(Err(LagError::Short), on_one_clock),
-        // Which may be a lag's own doing.
+        // The cause may itself be a lag.
         Err(CalibrationError::NothingExplained { .. }) => on_one_clock(samples),
         Err(_) => Err(LagError::Short),
     }
@@ -150,19 +149,19 @@ fn lag_by_motion(samples: &Samples) -> Result<Lag, LagError> {
     found(best)
 }
 
-/// A lag that the motion tells.
+/// Returns a lag that was found from the motion.
 fn of_motion(lag_s: f64, sd_s: f64, movement_s: f64, gain: f64, unexplained: f64) -> Lag {
     let own_s = OWN_SHARE * movement_s;
     let certain = gain >= CERTAIN && unexplained <= WELL_EXPLAINED && lag_s.abs() > SIGNIFICANT * sd_s.hypot(own_s);
     Lag { lag_s, sd_s, own_s, movement_s, gain, unexplained, certain }
 }
 
-/// Lag of a reference with a clock of its own, each `(times in s, values)`: what to subtract from its times to get the readings'.
+/// Returns the lag of a reference with a clock of its own, each `(times in s, values)`: the offset to subtract from its times.
 ///
 /// As [`reference_lag`], for any offset that leaves two fifths of the shorter recording in common.
 ///
 /// # Errors
-/// [`LagError`] if the motion does not tell: other than on one clock, an offset of zero is no likelier than any other.
+/// [`LagError`] if the motion does not determine a lag. Unlike on one clock, an offset of zero is no likelier than any other.
 pub fn clock_lag(readings: (&[f64], &[f64]), reference: (&[f64], &[f64])) -> Result<Lag, LagError> {
     let search = Search::new(readings, reference, None)?;
     let best = search.best()?;

@@ -2,21 +2,21 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::samples::usual_step_s;
 
-/// Regressors and a constant.
+/// Number of regressors, the constant included.
 const PARAMETERS: usize = 8;
-/// Most rows of the grid that the reference is put on.
+/// Largest number of rows on the reference's grid.
 const MOST_MOTION_ROWS: f64 = 20_000.0;
-/// Most readings that take part.
+/// Largest number of readings used.
 const MOST_READINGS: f64 = 1500.0;
-/// Longest window of the high-pass, as a share of the recording.
+/// Longest window of the high-pass, as a fraction of the recording.
 const SLOW_SHARE: f64 = 1.0 / 6.0;
-/// Smaller movements, as a share of the range, are no way.
+/// Least movement that adds to the path, as a fraction of the range.
 const LEAST_STROKE: f64 = 0.1;
 /// Least number of rows for a regression.
 const FEWEST: usize = 40;
-/// Blocks of neighbours that are left out in turn.
+/// Number of blocks of consecutive rows that are left out in turn.
 pub(super) const BLOCKS: usize = 10;
-/// Ridge of the regression, relative to each regressor's square: a block left out may hold what others do not.
+/// Ridge of the regression, relative to each regressor's square: a held-out block may contain values that others do not.
 const RIDGE: f64 = 1e-4;
 /// Rows to each side over which a speed is averaged: a reference's noise is larger than its steps.
 const SMOOTHED: usize = 2;
@@ -24,12 +24,12 @@ const SMOOTHED: usize = 2;
 type Regressors = SVector<f64, { PARAMETERS - 1 }>;
 type Row = SVector<f64, PARAMETERS>;
 
-/// Regressors of a reference behind a high-pass, on a grid of its own clock.
+/// High-passed regressors from a reference, on a grid of its own clock.
 pub(super) struct ReferenceRegressors {
     start_s: f64,
     step_s: f64,
     rows: Vec<Regressors>,
-    /// Way from the first row to each, in full strokes.
+    /// Path length from the first row to each, in full strokes.
     strokes: Vec<f64>,
     /// Time of a full stretch at the typical rate, s.
     pub stretch_s: f64,
@@ -37,7 +37,7 @@ pub(super) struct ReferenceRegressors {
 }
 
 impl ReferenceRegressors {
-    /// Regressors of a reference; the window of the high-pass is `slow` full stretches.
+    /// Computes the regressors of a reference; the window of the high-pass is `slow` full stretches.
     pub(super) fn new((times, values): (&[f64], &[f64]), slow: f64) -> Option<Self> {
         let (times, values) = known(times, values);
         let step = step_s(&times)?;
@@ -60,7 +60,8 @@ impl ReferenceRegressors {
         (self.start_s, self.start_s + self.step_s * (self.rows.len() - 1) as f64)
     }
 
-    /// The smallest and the largest lag that leave so many strokes to readings of the same time span, s; `None` if there are fewer.
+    /// Returns the smallest and the largest lag, s, at which readings over the same time span overlap with `least` strokes; `None` if there
+    /// are fewer.
     pub(super) fn lags_with_strokes(&self, least: f64) -> Option<(f64, f64)> {
         let all = *self.strokes.last()?;
         let rows_before = |way: f64| self.strokes.partition_point(|strokes| *strokes < way);
@@ -69,7 +70,7 @@ impl ReferenceRegressors {
         Some((-self.step_s * early as f64, self.step_s * late as f64))
     }
 
-    /// The regressors at a time of the reference's clock; `None` outside of it, or where its ends disturb them.
+    /// Returns the regressors at a time of the reference's clock; `None` outside of it, or near its ends.
     fn at(&self, time_s: f64) -> Option<Regressors> {
         let place = (time_s - self.start_s) / self.step_s;
         let margin = 0.5 * self.slow_s / self.step_s;
@@ -82,7 +83,7 @@ impl ReferenceRegressors {
     }
 }
 
-/// Way from the first row to each, in full strokes; what is smaller than a tenth of one is no way.
+/// Returns the path length from the first row to each, in full strokes; movements below a tenth of a stroke do not count.
 fn strokes(scaled: &[f64]) -> Vec<f64> {
     let (mut way, mut place) = (0.0, scaled.first().copied().unwrap_or(0.0));
     let to = |x: &f64| {
@@ -95,7 +96,7 @@ fn strokes(scaled: &[f64]) -> Vec<f64> {
     scaled.iter().map(to).collect()
 }
 
-/// Powers of the reference, and its movements through two low-passes each, with and without their sign.
+/// Returns powers of the reference, and its movements through two low-passes each, with and without their sign.
 fn regressors(scaled: &[f64], step_s: f64, stretch_s: f64) -> Vec<Regressors> {
     let keep = [stretch_s, 8.0 * stretch_s].map(|tau| (-step_s / tau).exp());
     let mut branches = [0.0; 4];
@@ -125,7 +126,7 @@ fn take_out_slow<const N: usize>(rows: &mut [SVector<f64, N>], window: usize) {
     }
 }
 
-/// Readings without what is slow.
+/// Readings without their slow changes.
 pub(super) struct Pull {
     rows: Vec<(f64, f64)>,
 }
@@ -150,7 +151,7 @@ impl Pull {
         (self.rows[0].0, self.rows[self.rows.len() - 1].0)
     }
 
-    /// The regression at a lag of the reference; `None` if there is too little in common.
+    /// Fits the regression at a lag of the reference; `None` if there is too little overlap.
     pub(super) fn fit(&self, motion: &ReferenceRegressors, lag_s: f64) -> Option<Fit> {
         let known = self.rows.iter().filter_map(|(time_s, value)| Some((motion.at(time_s + lag_s)?.push(1.0), *value)));
         let rows: Vec<(Row, f64)> = known.collect();
@@ -172,16 +173,16 @@ impl Pull {
 
 /// Residual of the regression at one lag.
 pub(super) struct Fit {
-    /// Squared error on blocks left out, as a share of the readings' variance.
+    /// Squared error on held-out blocks, as a fraction of the readings' variance.
     pub unexplained: f64,
     /// Residual of each block.
     by_block: Vec<f64>,
-    /// Share of the rows that there could be at any lag.
+    /// Fraction of the largest possible number of rows that overlap at this lag.
     pub overlap: f64,
 }
 
 impl Fit {
-    /// The unexplained share without a block.
+    /// Returns the unexplained fraction without a block.
     pub(super) fn without(&self, left_out: Option<usize>) -> f64 {
         self.unexplained - left_out.map_or(0.0, |block| self.by_block[block])
     }
@@ -232,12 +233,12 @@ impl Sums {
     }
 }
 
-/// The usual step of times.
+/// Returns the usual step of times, s.
 fn step_s(times: &[f64]) -> Option<f64> {
     Some(usual_step_s([times].into_iter())).filter(|step| *step > 0.0)
 }
 
-/// Mean speed along the way: holds do not count.
+/// Returns the mean speed along the path; holds do not count.
 fn typical_rate(grid: &[f64], step_s: f64) -> f64 {
     let window = |i: usize| &grid[i.saturating_sub(SMOOTHED)..(i + SMOOTHED + 1).min(grid.len())];
     let smooth: Vec<f64> = (0..grid.len()).map(|i| window(i).iter().sum::<f64>() / window(i).len() as f64).collect();
@@ -246,12 +247,12 @@ fn typical_rate(grid: &[f64], step_s: f64) -> f64 {
     squares / sum / step_s
 }
 
-/// Known values of a series.
+/// Returns the known values of a series.
 fn known(times: &[f64], values: &[f64]) -> (Vec<f64>, Vec<f64>) {
     times.iter().zip(values).filter(|(_, value)| value.is_finite()).map(|(time, value)| (*time, *value)).unzip()
 }
 
-/// A series at even steps, by straight lines.
+/// Interpolates a series linearly at even steps.
 fn on_grid(times: &[f64], values: &[f64], step_s: f64) -> Vec<f64> {
     let (Some(start), Some(end)) = (times.first(), times.last()) else { return Vec::new() };
     let mut next = 1;

@@ -1,32 +1,33 @@
 use super::motion::{BLOCKS, Fit, Pull, ReferenceRegressors};
 use super::{Lag, LagError};
 
-/// Lags tried in the time of one full stretch, at first …
+/// Number of lags tried in the time of one full stretch, in the coarse search.
 const COARSE_STEPS: f64 = 12.0;
-/// … and between two of those, about the best of them.
+/// Number of lags tried between two of those, around the best.
 const FINE_STEPS: i32 = 8;
-/// Lags leave at least this share of the shorter recording in common with the longer one.
+/// Least fraction of the shorter recording that must overlap with the longer one.
 const LEAST_OVERLAP: f64 = 0.4;
-/// … and, on one clock, strokes over the whole range: one or two of them are explained wherever they are.
+/// Least number of strokes over the whole range in the overlap, on one clock; one or two can be explained anywhere.
 const LEAST_STROKES: f64 = 4.0;
-/// Slower changes than over so many full stretches are taken out …
+/// Window of the high-pass, in full stretches.
 const SLOW: f64 = 2.0;
-/// … and, to see how much that matters, these.
+/// Other windows, which show the effect of that choice.
 const OTHER_SLOW: [f64; 2] = [1.0, 4.0];
-/// Above this unexplained share of the readings' variance the motion does not show in them.
+/// Largest unexplained fraction of the readings' variance at which the motion shows in them.
 const MOST_UNEXPLAINED: f64 = 0.6;
-/// Another lag fits alike if it leaves less than this many times the error of the best one …
+/// Ratio of errors below which another lag fits as well as the best one.
 const ALIKE: f64 = 3.0;
-/// … on this share of its rows, at least: less of them is no evidence against it.
+/// Least overlap of such a lag, as a fraction of the best one's rows; with fewer rows it is no evidence against the
+/// best one.
 const ALIKE_OVERLAP: f64 = 0.6;
-/// Unexplained shares below this are as good: what rounding and noise leave.
+/// Unexplained fraction below which fits count as equal, due to rounding and noise.
 const EXPLAINED: f64 = 3e-4;
 
 /// Fits at all lags tried.
 pub(super) struct Search {
     motion: ReferenceRegressors,
     pull: Pull,
-    /// s, increasing.
+    /// Lags, s, increasing.
     lags: Vec<f64>,
     fits: Vec<Option<Fit>>,
     coarse_s: f64,
@@ -51,7 +52,8 @@ impl Search {
         Ok(Self { motion, pull, lags, fits, coarse_s })
     }
 
-    /// The lag that explains most: the logarithm of what stays unexplained, over the rows that it leaves a reference.
+    /// Returns the lag with the least logarithm of the unexplained fraction, over the rows for which it leaves a
+    /// reference.
     pub(super) fn best(&self) -> Result<usize, LagError> {
         let known = (0..self.lags.len()).filter(|&i| self.fits[i].is_some());
         let best = known.min_by(|a, b| self.cost(*a).total_cmp(&self.cost(*b))).ok_or(LagError::Short)?;
@@ -62,35 +64,35 @@ impl Search {
         Ok(best)
     }
 
-    /// A lag at an end of those tried, s.
+    /// Returns a lag, s, if it is at an end of those tried.
     pub(super) fn end(&self, i: usize) -> Option<f64> {
         (i == 0 || i + 1 == self.lags.len()).then(|| self.lags[i])
     }
 
-    /// No lag.
+    /// Returns the index of the lag zero.
     pub(super) fn zero(&self) -> usize {
         self.lags.partition_point(|lag_s| *lag_s < -0.5 * self.coarse_s).min(self.lags.len().saturating_sub(1))
     }
 
-    /// A lag within `share` of a movement that fits like the best one.
+    /// Returns a lag within `share` of a movement that fits as well as the best one.
     pub(super) fn nearest_to_zero(&self, best: usize, share: f64) -> Option<usize> {
         let alike = self.alike(best).filter(|&i| self.lags[i].abs() <= share * self.motion.stretch_s);
         alike.min_by(|a, b| self.error(*a).total_cmp(&self.error(*b)))
     }
 
-    /// Refuses a lag that another one, more than half a stretch away, fits alike.
+    /// Refuses a lag if another one, more than half a stretch away, fits as well.
     pub(super) fn check(&self, best: usize) -> Result<(), LagError> {
         let apart = |i: &usize| (self.lags[*i] - self.lags[best]).abs() > 0.5 * self.motion.stretch_s;
         let rival = self.alike(best).filter(apart).min_by(|a, b| self.cost(*a).total_cmp(&self.cost(*b)));
         rival.map_or(Ok(()), |rival| Err(LagError::Repeats(self.lags[best], self.lags[rival])))
     }
 
-    /// Error without a lag over that with it.
+    /// Returns the error without a lag over that with it.
     pub(super) fn gain(&self, i: usize) -> f64 {
         self.pull.fit(&self.motion, 0.0).map_or(1.0, |fit| fit.unexplained).max(EXPLAINED) / self.error(i)
     }
 
-    /// The lag near one that was tried.
+    /// Refines a lag near one that was tried.
     pub(super) fn lag(
         &self,
         i: usize,
@@ -108,7 +110,7 @@ impl Search {
         Ok(super::of_motion(lag_s, squares.sqrt(), self.motion.stretch_s, self.gain(i), unexplained))
     }
 
-    /// Valleys that fit like the best lag, itself among them.
+    /// Returns the local minima that fit as well as the best lag, which is among them.
     fn alike(&self, best: usize) -> impl Iterator<Item = usize> {
         let overlap = |i: usize| self.fits[i].as_ref().map_or(0.0, |fit| fit.overlap);
         let is_valley = |i: usize| {
@@ -131,7 +133,7 @@ impl Search {
     }
 }
 
-/// The lags to try, s.
+/// Returns the range of lags to try, s.
 fn range(motion: &ReferenceRegressors, pull: &Pull, within_s: Option<f64>) -> Option<(f64, f64)> {
     let ((r0, r1), (s0, s1)) = (pull.span(), motion.span());
     let common = LEAST_OVERLAP * (r1 - r0).min(s1 - s0);
@@ -141,7 +143,7 @@ fn range(motion: &ReferenceRegressors, pull: &Pull, within_s: Option<f64>) -> Op
     Some((first.max(-within_s).max(earliest_s), last.min(within_s).min(latest_s)))
 }
 
-/// The minimum near a lag, what it scatters by when blocks are left out, and what it leaves unexplained.
+/// Returns the minimum near a lag, its jackknife standard deviation over blocks, and its unexplained fraction.
 fn refine(motion: &ReferenceRegressors, pull: &Pull, about_s: f64, coarse_s: f64) -> (f64, f64, f64) {
     let step_s = coarse_s / f64::from(FINE_STEPS);
     let lags: Vec<f64> = (-2 * FINE_STEPS..=2 * FINE_STEPS).map(|i| about_s + f64::from(i) * step_s).collect();
@@ -151,7 +153,7 @@ fn refine(motion: &ReferenceRegressors, pull: &Pull, about_s: f64, coarse_s: f64
             fits.iter().map(|fit| fit.as_ref().map_or(f64::INFINITY, |fit| fit.without(left_out))).collect();
         let best = (0..errors.len()).min_by(|a, b| errors[*a].total_cmp(&errors[*b])).unwrap_or(lags.len() / 2);
         let around = best.checked_sub(1).and_then(|before| Some((*errors.get(before)?, *errors.get(best + 1)?)));
-        // The minimum of the parabola through the best lag and its neighbours.
+        // Minimum of the parabola through the best lag and its neighbours.
         let moved = around.map_or(0.0, |(before, after)| {
             let curvature = before - 2.0 * errors[best] + after;
             if curvature > 0.0 && curvature.is_finite() { 0.5 * (before - after) / curvature } else { 0.0 }
