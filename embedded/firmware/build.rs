@@ -1,4 +1,4 @@
-//! Puts the memory map where the linker script of `cortex-m-rt` looks for it.
+//! Puts the memory map where the linker script of `cortex-m-rt` finds it.
 
 use std::{env, error::Error, fs, path::PathBuf};
 

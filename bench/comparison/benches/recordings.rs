@@ -1,4 +1,4 @@
-//! Whole recordings: smoothing, one pass of a calibration.
+//! Whole recordings: smoothing, and one pass of a calibration.
 #![allow(missing_docs, reason = "criterion's macro makes a public function without docs")]
 
 use std::hint::black_box;

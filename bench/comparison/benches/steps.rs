@@ -1,4 +1,4 @@
-//! One prediction and one scalar update, state carried from step to step: latency, not throughput.
+//! One prediction and one scalar update, with the state carried from step to step: latency, not throughput.
 #![allow(missing_docs, reason = "criterion's macro makes a public function without docs")]
 
 use std::hint::black_box;
@@ -16,7 +16,7 @@ impl Visitor for Timed<'_, '_> {
         self.0.bench_function(name, |bencher| {
             bencher.iter(|| {
                 for reading in readings {
-                    // Model and state stand in memory before and after every step, as they do between readings.
+                    // Model and state are in memory before and after every step, as they are between readings.
                     black_box(black_box(&mut filter).step(black_box(*reading)));
                 }
             });

@@ -1,5 +1,5 @@
-//! Other Kalman filters on the sensor of three states, each used as its documentation shows it: on its linear model, with F, Q,
-//! H and R as constants; and on the one that is not linear, with these worked out anew in every step, as ohmstrain's filters do.
+//! Other Kalman filters on the sensor of three states, each used as its documentation shows. On the linear model, F, Q, H and R
+//! are constants; on the nonlinear one they are computed in every step, as in ohmstrain's filters.
 
 mod rivals;
 mod simulated;

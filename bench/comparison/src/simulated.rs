@@ -1,14 +1,14 @@
-//! Work that a calibration repeats over and over: one pass of the EKF over a recording.
+//! Work that a calibration repeats many times: one pass of the EKF over a recording.
 
 use ohmstrain_bench_data::simulate::{Material, Protocol, SimulationSettings, simulate};
 use ohmstrain_bench_filters::sensor;
 use ohmstrain_ekf::{Belief, Compact, Ekf, Reading, SparseEkf};
 use ohmstrain_model::{SwitchedModel, SwitchedStep};
 
-/// Seconds of the recording; 20 readings in each.
+/// Duration of the recording, s, with 20 readings per second.
 const DURATION_S: f64 = 150.0;
 
-/// 3000 readings R/R₀ - 1 of a simulated bench at 20 Hz.
+/// Returns 3000 readings R/R₀ - 1 of a simulated bench at 20 Hz.
 ///
 /// # Panics
 /// Never: the settings are valid.
@@ -21,7 +21,7 @@ pub fn simulated_recording() -> Vec<f64> {
     readings
 }
 
-/// Filters of two branches and a baseline, which is what `calibrate` fits most often.
+/// Filters of two branches and a baseline, the structure that `calibrate` fits most often.
 pub struct RecordingPass {
     generic: Ekf<SwitchedModel<f64, 2, 5>>,
     prepared: SwitchedStep<f64, 2>,
@@ -30,7 +30,7 @@ pub struct RecordingPass {
 }
 
 impl RecordingPass {
-    /// Filters at 20 Hz.
+    /// Creates filters at 20 Hz.
     ///
     /// # Panics
     /// Never: the step's length is positive.
@@ -45,7 +45,7 @@ impl RecordingPass {
         }
     }
 
-    /// Strain after the last reading; NaN if a step fails.
+    /// Returns the strain after the last reading, by the generic filter; NaN if a step fails.
     #[must_use]
     pub fn generic(&self, readings: &[f64]) -> f64 {
         let mut belief = self.start;
@@ -58,7 +58,7 @@ impl RecordingPass {
         belief.mean[0]
     }
 
-    /// The same along the sparse path.
+    /// Returns the same by the sparse filter.
     #[must_use]
     pub fn sparse(&self, readings: &[f64]) -> f64 {
         let mut belief = self.start;

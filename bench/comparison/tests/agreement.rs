@@ -1,4 +1,4 @@
-//! A benchmark of a wrong filter is worth nothing: on the linear sensor all filters are the Kalman filter, and all
+//! A benchmark of a wrong filter is worthless. On the linear sensor, all filters must equal the Kalman filter, and all
 //! smoothers the Rauch-Tung-Striebel smoother.
 
 use nalgebra::SVector;
@@ -11,11 +11,11 @@ use ohmstrain_bench_filters::{
 };
 use ohmstrain_ekf::{Belief, Compact, Estimator, Reading, SparseEkf};
 
-/// A filter forgets its rounding in some hundred steps; a step leaves some 30 ε of quantities that are up to 10⁴ times
-/// larger than what the difference P - K S Kᵀ leaves of them: 10² · 30 · 10⁴ ε = 7e-9 of a strain of 0.1.
+/// A filter forgets rounding errors within some hundred steps. A step contributes some 30 ε of quantities that are up to 10⁴
+/// times larger than the difference P - K S Kᵀ. That gives 10² · 30 · 10⁴ ε = 7e-9, relative to a strain of 0.1.
 const TOLERANCE: f64 = 1e-9;
 
-/// The textbook filter by loops over full matrices, covariance in Joseph's form; strain after every reading.
+/// Runs the textbook filter with loops over full matrices, covariance in Joseph's form; returns the strain after every reading.
 fn textbook(model: &LinearModel, readings: &[f64]) -> Vec<f64> {
     type Matrix = [[f64; 3]; 3];
     let matrix = |entry: &dyn Fn(usize, usize) -> f64| -> Matrix {
@@ -73,13 +73,13 @@ fn all_filters_agree_on_the_linear_sensor() {
     compared.visit("ours, sigma points", &y, GatedUnscented::<1, 3, 6>::new(sensor));
     compared.visit("ours, generic", &y, ekf::<1, 3, 6>(sensor));
     assert_eq!(compared.seen.len(), 11);
-    // The strain moves, so that agreement says something.
+    // The strain moves, so that agreement is significant.
     let (least, most) = compared.expected.iter().fold((1.0_f64, -1.0_f64), |(a, b), x| (a.min(*x), b.max(*x)));
     assert!(most - least > 0.05, "{least} to {most}");
 }
 
-/// F, Q and H of ours are nowhere written down: this says that they are those that the others were given. What a filter leaves of
-/// an uncertain direction is smooth, so that rounding stays rounding.
+/// Tests that our F, Q and H, which are never formed as matrices, equal those given to the others. The moments of an uncertain
+/// direction are smooth functions, so that rounding errors stay small.
 #[test]
 fn all_filters_agree_on_the_sensor_that_is_not_linear() {
     let readings = readings::<1>(STEPS);
@@ -101,7 +101,7 @@ fn all_smoothers_agree_on_the_linear_sensor() {
     let ours = smoother(linear_sensor());
     let expected: Vec<_> = adskalman_smoother(&model)(&vectors).unwrap().iter().map(|s| s.state()[0]).collect();
     let filtered = textbook(&model, &readings);
-    // The end is the filter's, the rest is not: a smoother that did nothing would not pass.
+    // The last row is the filter's, the others are not: a smoother without effect would not pass.
     assert!((expected[STEPS - 1] - filtered[STEPS - 1]).abs() < TOLERANCE);
     assert!(expected.iter().zip(&filtered).any(|(a, b)| (a - b).abs() > 1e-3));
     let sparse = SparseEkf::<_, Compact, 1, 3>::new(linear_sensor(), DT_S).unwrap();
@@ -125,7 +125,8 @@ fn all_smoothers_agree_on_the_linear_sensor() {
     }
 }
 
-/// Every timed filter of the nonlinear sensor takes every reading, and its strain stays where the law holds.
+/// Tests that every timed filter of the nonlinear sensor takes every reading, and that its strain stays within the range of the
+/// law.
 #[test]
 fn every_filter_takes_every_reading() {
     struct Runs;
@@ -140,8 +141,8 @@ fn every_filter_takes_every_reading() {
     every_filter(&mut Runs);
 }
 
-/// The filter of the sensor's own model follows the strain, whose deviation is 0.076. Once the start is forgotten its own
-/// deviation says 0.004; an error of twice that would belong to another sensor.
+/// Tests that the filter of the sensor's own model follows the strain, whose deviation is 0.076. Once the start is forgotten,
+/// its own deviation is 0.004; twice that as an error would mean another sensor.
 #[test]
 fn the_readings_are_those_of_the_sensor() {
     let mut filter = GatedSparse::<1, 3, 6, Compact>::new(sensor());
@@ -161,7 +162,7 @@ fn the_readings_are_those_of_the_sensor() {
 #[test]
 fn recordings_are_taken_to_their_end() {
     let (recording, pass) = (simulated_recording(), RecordingPass::new());
-    // The two paths split an uncertain rate by different densities, so their strains are close and not equal.
+    // The two paths split an uncertain rate by different densities, so that their strains are close but not equal.
     let apart = (pass.generic(&recording) - pass.sparse(&recording)).abs();
     assert!(apart < 0.02, "{apart}");
 }

@@ -7,11 +7,11 @@ use ohmstrain_model::StrainRange;
 
 use crate::Filter;
 
-/// Training rows and simulated rows, as many as `calibrate` keeps.
+/// Numbers of training rows and of simulated rows that `calibrate` keeps.
 const ROWS: usize = 200;
 const SIMULATED: usize = 64;
 
-/// The learned correction of a filter's strain as it is by default, with numbers made up: what it costs does not depend on them.
+/// A filter with the default learned correction. Its numbers are made up, since the cost does not depend on them.
 #[derive(Clone, Debug)]
 pub struct Corrected {
     rows: Vec<RowBlock<f64, FILTER_INPUTS>>,
@@ -22,7 +22,7 @@ pub struct Corrected {
 }
 
 impl Corrected {
-    /// The correction, before any reading.
+    /// Creates the correction before any reading.
     #[must_use]
     pub fn new() -> Self {
         let number = |k: usize| (0.37 * k as f64).sin() + 0.5 * (1.93 * k as f64).sin();

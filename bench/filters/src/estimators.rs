@@ -10,10 +10,10 @@ use crate::{
     phased_sensor, readings, sensor,
 };
 
-/// Two periods of the readings, so that they can be repeated.
+/// Number of readings: two periods, so that they can be repeated.
 pub const STEPS: usize = 1000;
 
-/// Any estimator with a gate on the normalised innovation squared and a log-likelihood.
+/// An estimator with a gate on the normalised innovation squared and a log-likelihood.
 #[derive(Clone, Copy, Debug)]
 pub struct Gated<E: Estimator<f64, N, L>, const N: usize, const L: usize> {
     estimator: E,
@@ -64,7 +64,7 @@ pub fn ekf<const B: usize, const N: usize, const L: usize>(
     Gated::new(Ekf::new(model), Belief::initial(&model))
 }
 
-/// Shows every filter with a thousand readings of the sensor it is for; all but `reference_3` are for a [`sensor`].
+/// Passes every filter to the visitor, with a thousand readings of its sensor; that is [`sensor`], except for `reference_3`.
 ///
 /// # Panics
 /// Never: the parameters are valid.
@@ -81,7 +81,7 @@ pub fn every_filter(visitor: &mut impl Visitor) {
     every_large_filter(visitor);
 }
 
-/// Those of six states: strain, rate, three branches, baseline.
+/// Passes the filters of six states: strain, rate, three branches, baseline.
 fn every_large_filter(visitor: &mut impl Visitor) {
     let readings = readings::<3>(STEPS);
     let (six, phased) = (sensor::<3, 6>(), phased_sensor::<3, 6>());

@@ -1,5 +1,5 @@
-//! Filters of ohmstrain that are measured: its estimators at a fixed rate, each with its state, one reading at a time; and a
-//! hand-written filter without checks to measure them by.
+//! Measured filters of ohmstrain: its estimators at a fixed rate, each with its state, one reading at a time; and a
+//! hand-written filter without checks for comparison.
 
 mod correction;
 mod estimators;
@@ -22,15 +22,15 @@ pub use sparse::{GatedSparse, GatedUnscented};
 
 /// A filter with its state.
 pub trait Filter {
-    /// Takes the next reading; whether the step went well.
+    /// Takes the next reading; returns true if the step succeeded.
     fn step(&mut self, reading: f64) -> bool;
 
-    /// Mean strain.
+    /// Returns the mean strain.
     fn strain(&self) -> f64;
 }
 
-/// Whoever wants to see filters of many types.
+/// Visitor of filters of many types.
 pub trait Visitor {
-    /// Sees a filter that has not taken a reading yet, and the readings it is for.
+    /// Takes a filter before its first reading, and its readings.
     fn visit(&mut self, name: &'static str, readings: &[f64], filter: impl Filter);
 }

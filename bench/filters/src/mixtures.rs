@@ -3,7 +3,7 @@ use ohmstrain_ekf::{Hypotheses, Imm, Mixture, MixtureResidual, PhaseMixture, Rea
 use crate::Filter;
 use crate::readings::GATE;
 
-/// A filter of hypotheses that steps from one state into another that is there already.
+/// A filter of hypotheses that steps from one state into another, existing one.
 pub(crate) trait StepsInto {
     type State: Copy;
 
@@ -44,12 +44,11 @@ steps_into!(Imm<f64, 3, 6>, PhaseMixture<f64, 6, 21>);
 steps_into!(SignSplit<f64, 3, 6, K>, Mixture<f64, 6, 21, K>, K);
 steps_into!(Hypotheses<f64, 3, 6, K>, Mixture<f64, 6, 21, K>, K);
 
-/// Filter with a gate on the normalised innovation squared and a log-likelihood. Its two states change places:
-/// nothing is copied.
+/// Filter with a gate on the normalised innovation squared and a log-likelihood. Its two states are swapped instead of copied.
 pub(crate) struct GatedMixture<F: StepsInto> {
     filter: F,
     states: [F::State; 2],
-    /// True if the second state is the present one.
+    /// True if the second state is the current one.
     second: bool,
     log_likelihood: f64,
 }

@@ -2,8 +2,8 @@ use ohmstrain_model::{Gauge, SensorLaw, correlated_steps, unexplained};
 
 use crate::{DT_S, sensor};
 
-/// The step of [`sensor`] as who has a filter of matrices writes it: in every step anew F, Q and H, from strain and an uncertain
-/// direction. Its numbers are those of [`Compact`](ohmstrain_ekf::Compact).
+/// The step of [`sensor`] as the user of a filter of matrices writes it: F, Q and H are computed in every step, from the strain
+/// and an uncertain direction. Its numbers are those of [`Compact`](ohmstrain_ekf::Compact).
 #[derive(Clone, Copy, Debug)]
 pub struct NonlinearModel {
     law: SensorLaw<f64, 1>,
@@ -21,16 +21,16 @@ pub struct NonlinearModel {
     drive: [f64; 2],
     drive_input: f64,
     cross_noise: [f64; 2],
-    /// Noise of the branch from the motion, and its own.
+    /// Noise of the branch caused by the motion, and its own noise.
     branch_noise: [f64; 2],
 }
 
-/// Prediction, and its dependence on the state before.
+/// Prediction and its Jacobian.
 #[derive(Clone, Copy, Debug)]
 pub struct Ahead {
     /// Mean of the state.
     pub mean: [f64; 3],
-    /// F, rows first.
+    /// F, row by row.
     pub transition: [[f64; 3]; 3],
     /// Q.
     pub noise: [[f64; 3]; 3],
@@ -38,7 +38,7 @@ pub struct Ahead {
     pub rate_variance: f64,
 }
 
-/// A reading as predicted.
+/// A predicted reading.
 #[derive(Clone, Copy, Debug)]
 pub struct Expected {
     /// Its mean.
@@ -80,7 +80,7 @@ impl NonlinearModel {
         }
     }
 
-    /// One step on from a mean and the covariances of strain and rate.
+    /// Predicts one step from a mean and the covariances of strain and rate.
     #[inline(always)]
     #[must_use]
     pub fn ahead(&self, [x0, x1, x2]: [f64; 3], [p00, p10, p11]: [f64; 3]) -> Ahead {
@@ -91,7 +91,7 @@ impl NonlinearModel {
         let branch = &self.law.branches[0];
         let middle = 0.5 * (x0 + m0);
         let inside = middle.max(self.law.range.lower).min(self.law.range.upper);
-        // Half of the growth for the old strain, half for the new one.
+        // Half of the growth comes from the old strain, half from the new one.
         let growth = if inside == middle { 0.5 } else { 0.0 };
         let (extend, retract) = (
             branch.extend_gain + branch.extend_gain_slope * inside,
@@ -147,7 +147,7 @@ impl Default for NonlinearModel {
     }
 }
 
-/// A rate divided between both directions, the probabilities of these, and the variance that this leaves.
+/// A rate split into both directions: expected parts, probabilities, and the remaining variance.
 struct Split {
     extend: f64,
     retract: f64,

@@ -1,4 +1,4 @@
-//! Work on a whole recording at a fixed rate.
+//! Smoothing of a whole recording at a fixed rate.
 
 use ohmstrain_ekf::{Belief, Dynamics, Ekf, Estimator, Reading};
 use ohmstrain_model::{SwitchedModel, SwitchedStep};
@@ -13,7 +13,7 @@ pub struct Smoother {
     start: Belief<f64, 3, 6>,
 }
 
-/// A smoother from the model's long-run distribution.
+/// Creates a smoother that starts from the model's long-run distribution.
 #[must_use]
 pub fn smoother(model: SwitchedModel<f64, 1, 3>) -> Smoother {
     let prepared = Dynamics::<f64, 3, 6>::prepare(&model, DT_S);
@@ -21,7 +21,7 @@ pub fn smoother(model: SwitchedModel<f64, 1, 3>) -> Smoother {
 }
 
 impl Smoother {
-    /// Keeps the filtered beliefs only, takes every step again on the way back, and smooths in place.
+    /// Keeps only the filtered beliefs, repeats every step in the backward pass, and smooths in place.
     ///
     /// # Panics
     /// If a step fails.

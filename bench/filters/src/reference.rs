@@ -3,9 +3,9 @@ use ohmstrain_ekf::Belief;
 use crate::nonlinear::NonlinearModel;
 use crate::{Filter, LinearModel, sensor};
 
-/// Mean, and lower triangle of P row by row, of strain, rate and one branch: motion does not depend on the branch, and a reading
-/// contains it with factor one. What a Kalman filter costs at least: written out by hand, the zeros of F left out and the one in
-/// H not multiplied, no check of anything, no likelihood.
+/// Mean, and lower triangle of P row by row, of strain, rate and one branch. Motion does not depend on the branch, and a
+/// reading contains the branch with factor one. It represents the minimal cost of a Kalman filter: written by hand, without the
+/// zeros of F and the one in H, without checks, without a likelihood.
 #[derive(Clone, Copy, Debug)]
 struct Packed {
     mean: [f64; 3],
@@ -13,7 +13,7 @@ struct Packed {
 }
 
 impl Packed {
-    /// Predicts by rows of F, and Q packed as P.
+    /// Predicts by rows of F, and Q packed like P.
     #[inline(always)]
     fn ahead(&self, mean: [f64; 3], [[a0, a1], [b0, b1]]: [[f64; 2]; 2], [c0, c1, c2]: [f64; 3], q: [f64; 6]) -> Self {
         let [p00, p10, p11, p20, p21, p22] = self.covariance;
@@ -33,7 +33,7 @@ impl Packed {
         Self { mean, covariance }
     }
 
-    /// Takes an innovation whose own variance is given, by H without its last entry.
+    /// Updates with an innovation and the variance of the reading; H is given without its last entry.
     #[inline(always)]
     fn take(&self, [h0, h1]: [f64; 2], innovation: f64, variance: f64) -> Self {
         let ([m0, m1, m2], [p00, p10, p11, p20, p21, p22]) = (self.mean, self.covariance);
@@ -55,7 +55,7 @@ pub struct PackedReference {
     /// Rows of F: strain and rate from strain and rate; the branch from all three.
     motion: [[f64; 2]; 2],
     branch: [f64; 3],
-    /// Q as P.
+    /// Q packed like P.
     noise: [f64; 6],
     /// H without its last entry.
     gradient: [f64; 2],
@@ -64,10 +64,10 @@ pub struct PackedReference {
 }
 
 impl PackedReference {
-    /// The filter of `model`.
+    /// Creates the filter of `model`.
     ///
     /// # Panics
-    /// If the model does not have the zeros and the one that are left out here.
+    /// If the model lacks the zeros, or the one, that are left out here.
     #[must_use]
     pub fn new(model: &LinearModel) -> Self {
         let (f, q, h) = (&model.transition, &model.noise, &model.gradient);
@@ -101,7 +101,7 @@ impl Filter for PackedReference {
     }
 }
 
-/// The filter of [`sensor`], which works out F, Q and H in every step.
+/// The filter of [`sensor`], which computes F, Q and H in every step.
 #[derive(Clone, Copy, Debug)]
 pub struct NonlinearReference {
     model: NonlinearModel,

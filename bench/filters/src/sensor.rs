@@ -1,4 +1,4 @@
-//! The sensor that everything here runs on. Illustrative numbers.
+//! The sensor of all benchmarks here. Its numbers are illustrative.
 
 use ohmstrain_ekf::{Belief, Channel, Dynamics};
 use ohmstrain_model::{
@@ -11,10 +11,10 @@ pub const DT_S: f64 = 0.01;
 /// Standard deviation of a reading's noise.
 pub(crate) const READING_SD: f64 = 2e-3;
 
-/// Strains for which the law holds.
+/// Range of strains for which the law holds.
 pub const RANGE: StrainRange<f64> = StrainRange { lower: -0.02, upper: 0.35 };
 
-/// The law of a sensor whose `B` branches share what relaxes.
+/// Returns the law of a sensor whose `B` branches share the relaxation.
 pub(crate) fn law<T: Scalar, const B: usize>() -> SensorLaw<T, B> {
     let share = 1.0 / B as f64;
     SensorLaw {
@@ -32,7 +32,7 @@ pub(crate) fn law<T: Scalar, const B: usize>() -> SensorLaw<T, B> {
     }
 }
 
-/// A sensor with up to three branches, and a baseline if `N = B + 3`.
+/// Returns a sensor with up to three branches, and a baseline if `N = B + 3`.
 ///
 /// # Panics
 /// Never: the parameters are valid.
@@ -41,7 +41,7 @@ pub fn sensor<const B: usize, const N: usize>() -> SwitchedModel<f64, B, N> {
     sensor_of()
 }
 
-/// The same in numbers of any kind.
+/// Returns the same sensor with numbers of any type.
 ///
 /// # Panics
 /// Never: the parameters are valid.
@@ -50,7 +50,7 @@ pub fn sensor_of<T: Scalar, const B: usize, const N: usize>() -> SwitchedModel<T
     model(law(), motion(0.15))
 }
 
-/// The same for filters of phases: a moving body has a speed.
+/// Returns the same sensor for filters of phases: a moving body has a mean speed.
 ///
 /// # Panics
 /// Never: the parameters are valid.
@@ -59,7 +59,7 @@ pub fn phased_sensor<const B: usize, const N: usize>() -> SwitchedModel<f64, B, 
     model(law(), motion(0.15).with_phase_rate(0.1).unwrap())
 }
 
-/// A sensor that does not tell stretching from releasing: its law is linear, and so is its motion about strain zero.
+/// Returns a sensor that responds alike to stretching and releasing: its law is linear, and so is its motion about strain zero.
 ///
 /// # Panics
 /// Never: the parameters are valid.
@@ -92,7 +92,7 @@ fn model<T: Scalar, const B: usize, const N: usize>(law: SensorLaw<T, B>, motion
     SwitchedModel::new(law, motion, noise).expect("the parameters are valid")
 }
 
-/// The linear sensor over one step, as everyone else wants it: `x' = F x + n`, `y = H x + w`, rows first.
+/// The linear sensor over one step, in the form that other filters take: `x' = F x + n`, `y = H x + w`, row by row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinearModel {
     /// Transition F.
@@ -107,7 +107,7 @@ pub struct LinearModel {
     pub start: [f64; 3],
 }
 
-/// The matrices of [`linear_sensor`] for steps of [`DT_S`].
+/// Returns the matrices of [`linear_sensor`] for steps of [`DT_S`].
 #[must_use]
 pub fn linearised() -> LinearModel {
     let model = linear_sensor();

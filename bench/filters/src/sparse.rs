@@ -20,7 +20,7 @@ impl<S: Switch<f64>, G: Curve<f64>, const B: usize, const N: usize, const L: usi
     /// Starts from the long-run distribution of `model`.
     ///
     /// # Panics
-    /// If the model's law is not of the family of the filter.
+    /// If the model's law is not of the filter's family.
     #[must_use]
     pub fn new(model: SwitchedModel<f64, B, N>) -> Self {
         let ekf = SparseEkf::new(model, DT_S).expect("the filter is for such a law");

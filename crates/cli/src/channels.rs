@@ -9,11 +9,11 @@ use crate::error::CliError;
 use crate::input;
 use crate::whole_file;
 
-/// Columns that a recording of one channel has its readings in.
+/// Columns of readings in a recording of one channel.
 pub const ONE_CHANNEL: [&str; 3] = ["resistance_ohm", "resistance_ratio", "adc"];
-/// Endings of a column of readings, with the column that they are in a recording of one channel.
+/// Endings of columns of readings, each with its column in a recording of one channel.
 const READINGS: [(&str, &str); 3] = [("_ohm", "resistance_ohm"), ("_ratio", "resistance_ratio"), ("_adc", "adc")];
-/// Endings of a reference's column, with the column that it is in a recording of one channel.
+/// Endings of columns of references, each with its column in a recording of one channel.
 const REFERENCES: [(&str, &str); 4] =
     [("angle_deg", "angle_deg"), ("strain", "strain"), ("displacement_mm", "displacement_mm"), ("deg", "angle_deg")];
 
@@ -21,7 +21,7 @@ const REFERENCES: [(&str, &str); 4] =
 pub struct Table {
     path: PathBuf,
     bytes: Vec<u8>,
-    /// Beginning and end of the header in it.
+    /// Byte range of the header in the text.
     header: (usize, usize),
     columns: Vec<String>,
     sha256: String,
@@ -34,7 +34,7 @@ pub struct Channel {
     pub column: String,
     /// The name without its unit.
     pub name: String,
-    /// The column that it is in a recording of one channel.
+    /// Its column in a recording of one channel.
     known: &'static str,
     /// The column of its reference.
     pub reference: String,
@@ -61,8 +61,8 @@ impl Table {
         Ok(Some(Self { path: path.to_path_buf(), bytes, header, columns, sha256 }))
     }
 
-    /// Columns of readings, each with its reference: the one with its own name (`index_ohm`, `index_angle_deg`), or one for all
-    /// (`strain`, `angle_deg`, or the only one that there is).
+    /// Returns the columns of readings, each with its reference: the one of the same name (`index_ohm`, `index_angle_deg`), or
+    /// else one for all channels (`strain`, `angle_deg`, or the only one in the file).
     pub fn channels(&self) -> Result<Vec<Channel>, CliError> {
         self.columns
             .iter()
@@ -89,7 +89,7 @@ impl Table {
         Ok(Channel { column: column.clone(), name: name.into(), known, reference: found.clone() })
     }
 
-    /// The recording of one channel.
+    /// Returns the recording of one channel.
     pub fn trace(&self, channel: &Channel, overrides: &Metadata) -> Result<TraceFile, CliError> {
         let own = channel.known;
         let known = reference(&channel.reference).map_or("_", |(_, known)| known);
@@ -112,7 +112,7 @@ impl Table {
         };
         let header = self.columns.iter().map(name).collect::<Vec<_>>().join(",");
         let bytes = [&self.bytes[..self.header.0], header.as_bytes(), &self.bytes[self.header.1..]].concat();
-        // Faults are in a column of this file, not of the one that stands for it.
+        // Messages name the column of this file, not the one that stands for it in a recording of one channel.
         let named = |text: String| {
             let text = text.replace(&format!("column `{own}`"), &format!("column `{}`", channel.column));
             text.replace(&format!("column `{known}`"), &format!("column `{}`", channel.reference))
@@ -124,20 +124,20 @@ impl Table {
         Ok(TraceFile { sha256: self.sha256.clone(), ..trace })
     }
 
-    /// File and line of its header.
+    /// Returns the file and the line of its header.
     pub fn header_name(&self) -> String {
         let line = 1 + self.bytes[..self.header.0].iter().filter(|byte| **byte == b'\n').count();
         format!("{}:{line}", self.path.display())
     }
 }
 
-/// The name of a column of readings without its unit, and its column in a recording of one channel.
+/// Returns the name of a column of readings without its unit, and its column in a recording of one channel.
 pub fn reading(column: &str) -> Option<(&str, &'static str)> {
     let found = READINGS.into_iter().find_map(|(ending, known)| Some((column.strip_suffix(ending)?, known)));
     found.filter(|(name, _)| !name.is_empty())
 }
 
-/// The name of a reference's column without its quantity, and its column in a recording of one channel.
+/// Returns the name of a reference's column without its quantity, and its column in a recording of one channel.
 pub fn reference(column: &str) -> Option<(&str, &'static str)> {
     let of = |(ending, known): &(&'static str, &'static str)| {
         let stem = column.strip_suffix(ending)?;
@@ -148,7 +148,8 @@ pub fn reference(column: &str) -> Option<(&str, &'static str)> {
     REFERENCES.iter().find_map(of)
 }
 
-/// Name of the column of a reference's standard deviation: `index_angle_sd` of `index_angle_deg`, `strain_sd` of `strain`.
+/// Returns the name of the column with a reference's standard deviation: `index_angle_sd` of `index_angle_deg`, `strain_sd` of
+/// `strain`.
 fn deviation(reference: &str) -> Option<String> {
     let angle = reference.strip_suffix("angle_deg").map(|stem| format!("{stem}angle_sd"));
     angle.or_else(|| reference.strip_suffix("strain").map(|stem| format!("{stem}strain_sd")))
@@ -160,7 +161,7 @@ pub fn is_reference(column: &str) -> bool {
     reference(column).is_some() || of("angle_sd") || of("strain_sd")
 }
 
-/// Beginning and end of the first line that is neither empty nor a comment.
+/// Returns the byte range of the first line that is neither empty nor a comment.
 fn header(bytes: &[u8]) -> Option<(usize, usize)> {
     let mut start = 0;
     for line in bytes.split_inclusive(|byte| *byte == b'\n') {

@@ -19,7 +19,7 @@ pub enum CliError {
     /// The arguments contradict each other or the sensor file.
     #[error("{0}")]
     Arguments(String),
-    /// The contents of an input.
+    /// An input has invalid contents.
     #[error("{0}")]
     Input(String),
     /// `evaluate --check` found the estimates wanting.
@@ -28,7 +28,7 @@ pub enum CliError {
     /// `batch` could not do some recordings.
     #[error("{0}")]
     Batch(String),
-    /// Whoever read our output has left.
+    /// The reader of our output has closed the pipe.
     #[error("the pipe is closed")]
     ClosedPipe,
     /// Anything else.
@@ -37,7 +37,7 @@ pub enum CliError {
 }
 
 impl CliError {
-    /// The program's exit code.
+    /// Returns the program's exit code.
     pub const fn code(&self) -> u8 {
         match self {
             Self::ClosedPipe => 0,
@@ -57,7 +57,7 @@ impl CliError {
         ExitCode::from(self.code())
     }
 
-    /// Calibration failed on the contents of `files`.
+    /// Creates the error of a calibration that failed on the contents of `files`.
     pub fn calibration(files: &[&str], error: &CalibrationError) -> Self {
         match error {
             CalibrationError::Optimiser(_) => Self::Other(error.to_string()),
@@ -66,7 +66,7 @@ impl CliError {
         }
     }
 
-    /// An error about the contents of an input with the input's name.
+    /// Adds the input's name to an error about its contents.
     pub fn named(self, name: &str) -> Self {
         match self {
             Self::Input(text) => Self::Input(format!("{name}: {text}")),
@@ -74,15 +74,15 @@ impl CliError {
         }
     }
 
-    /// `path` cannot be read or written.
+    /// Creates the error of a `path` that cannot be read or written.
     pub fn file(doing: &str, path: &Path, error: &io::Error) -> Self {
         Self::Other(format!("cannot {doing} {}: {error}", path.display()))
     }
 }
 
-/// Errors of the library as the command line reports them: options are arguments, rows count from one.
+/// Errors of the library in the terms of the command line: options become arguments, rows count from one.
 impl CliError {
-    /// Converts the reason for having no source code of the sensor file `name`.
+    /// Converts the reason why the sensor file `name` cannot be exported.
     pub fn export(error: &ExportError, name: &str) -> Self {
         match error {
             ExportError::Unsupported { .. } | ExportError::Parameter(_) => Self::Input(format!("{name}: {error}")),
@@ -127,7 +127,7 @@ impl From<TraceError> for CliError {
     }
 }
 
-/// A word as a shell takes it. What cannot be printed stands in octal, as bash, zsh and ksh have it.
+/// Quotes a word for a shell. Unprintable bytes become octal escapes, as in bash, zsh and ksh.
 pub fn shell_word(word: &str) -> String {
     match (printable(word), shlex::try_quote(word)) {
         (Cow::Borrowed(_), Ok(quoted)) => quoted.into_owned(),

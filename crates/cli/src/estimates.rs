@@ -7,7 +7,7 @@ use crate::args::Format;
 use crate::error::CliError;
 use crate::parquet_table::ParquetTable;
 
-/// Writes estimates: one row per reading, cells that are not known left empty.
+/// Writer of estimates: one row per reading, with empty cells for unknown values.
 pub struct EstimateWriter<W: Write + Send> {
     rows: RowSink<W>,
     columns: Vec<Column>,
@@ -44,7 +44,7 @@ impl<W: Write + Send> EstimateWriter<W> {
         write_row(&mut self.rows, &self.columns, number, row.flags)
     }
 
-    /// Writes one row of [`Packed`] ones.
+    /// Writes one row that [`Packed`] has packed.
     fn write_packed(&mut self, row: &[u8]) -> Result<(), CliError> {
         let (numbers, flags) = row.split_at(row.len().saturating_sub(FLAG_BYTES));
         let mut numbers = numbers.as_chunks::<NUMBER_BYTES>().0.iter().map(|bytes| f64::from_le_bytes(*bytes));
@@ -55,7 +55,7 @@ impl<W: Write + Send> EstimateWriter<W> {
         write_row(&mut self.rows, &self.columns, |_| numbers.next().unwrap_or(f64::NAN), flags)
     }
 
-    /// Hands everything written so far on to the reader, as far as the format lets it.
+    /// Passes everything written so far on to the reader, as far as the format allows.
     pub fn flush(&mut self) -> Result<(), CliError> {
         match &mut self.rows {
             RowSink::Csv(rows) => Ok(rows.flush()?),
@@ -63,7 +63,7 @@ impl<W: Write + Send> EstimateWriter<W> {
         }
     }
 
-    /// Writes the end; how many rows there are.
+    /// Writes the end, and returns the number of rows.
     pub fn finish(self) -> Result<u64, CliError> {
         match self.rows {
             RowSink::Csv(mut rows) => rows.flush()?,
@@ -98,18 +98,18 @@ fn write_row<W: Write + Send>(
 const NUMBER_BYTES: usize = size_of::<f64>();
 const FLAG_BYTES: usize = size_of::<u16>();
 
-/// Rows of some columns as bytes, all of one length: numbers, then flags.
+/// Packer of rows into bytes of equal length: the numbers of some columns, then the flags.
 pub struct Packed {
     columns: Vec<Column>,
 }
 
 impl Packed {
-    /// Rows of these columns.
+    /// Creates a packer for these columns.
     pub const fn new(columns: Vec<Column>) -> Self {
         Self { columns }
     }
 
-    /// Bytes of a row.
+    /// Returns the length of a row in bytes.
     pub fn row_len(&self) -> usize {
         self.columns.len() * NUMBER_BYTES + FLAG_BYTES
     }
@@ -123,13 +123,13 @@ impl Packed {
         out.extend(bits.to_le_bytes());
     }
 
-    /// Writes rows that were packed.
+    /// Writes packed rows.
     pub fn unpack<W: Write + Send>(&self, rows: &[u8], writer: &mut EstimateWriter<W>) -> Result<(), CliError> {
         rows.chunks_exact(self.row_len()).try_for_each(|row| writer.write_packed(row))
     }
 }
 
-/// The columns of a sensor that are wanted, all if none is named.
+/// Returns the requested columns of a sensor's estimates; all if none is named.
 pub fn columns(sensor: &Sensor, chosen: &[String]) -> Result<Vec<Column>, CliError> {
     let known = sensor.columns();
     if chosen.is_empty() {

@@ -1,4 +1,4 @@
-//! The state of a filter between two streams.
+//! State of a filter between two streams.
 
 use std::path::Path;
 
@@ -9,13 +9,13 @@ use crate::error::CliError;
 use crate::stream::RowSource;
 use crate::whole_file;
 
-/// Reads what `--save-state` wrote.
+/// Reads a state that `--save-state` wrote.
 pub fn read(path: &Path) -> Result<Stored, CliError> {
     let text = whole_file::text(path)?;
     Stored::from_toml(&text).map_err(|error| CliError::Input(format!("{}: {error}", path.display())))
 }
 
-/// The clock of a stream, to be stored.
+/// Returns the clock of a stream in the form that is stored.
 pub const fn of_last_time(last: LastTime) -> StoredClock {
     match last {
         LastTime::Seconds(time_s) => StoredClock::TimeS(time_s),

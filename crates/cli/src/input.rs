@@ -10,7 +10,7 @@ use crate::error::CliError;
 use crate::sensor_file;
 use crate::whole_file::is_stdin;
 
-/// Bytes of a file that is not kept in memory as a whole.
+/// Bytes that are read at once from a file that is not kept in memory as a whole.
 const READ_AT_ONCE: usize = 1 << 16;
 
 /// Opens a recording for reading row by row; `-` is stdin.
@@ -19,11 +19,11 @@ pub fn open(path: &Path, overrides: &Metadata) -> Result<TraceReader<Box<dyn Rea
     Ok(TraceReader::with_overrides(text, &path.display().to_string(), &metadata)?)
 }
 
-/// The text of a recording, of a Parquet file the CSV that it stands for, and what is known of it besides.
+/// Returns the text of a recording (for a Parquet file, the equivalent CSV) and its further metadata.
 pub fn text_of(path: &Path, overrides: &Metadata) -> Result<(Box<dyn Read>, Metadata), CliError> {
     if is_stdin(path) {
         let mut stdin = io::stdin().lock();
-        // Waits for the first bytes, and leaves them where they are.
+        // Waits for the first bytes, without consuming them.
         if let Ok(first) = stdin.fill_buf() {
             refuse_parameters(path, first)?;
         }
@@ -48,7 +48,7 @@ fn text_of_parquet(path: &Path, overrides: &Metadata) -> Result<(Box<dyn Read>, 
     Ok((Box::new(text), metadata))
 }
 
-/// Reads a whole recording, of as many rows as there may be.
+/// Reads a whole recording, up to the permitted number of rows.
 pub fn read(path: &Path, overrides: &Metadata) -> Result<TraceFile, CliError> {
     if is_stdin(path) {
         return of_text(&mut io::stdin().lock(), path, overrides);
@@ -64,7 +64,7 @@ pub fn read(path: &Path, overrides: &Metadata) -> Result<TraceFile, CliError> {
     of_text(&mut file, path, overrides)
 }
 
-/// A whole recording of these bytes.
+/// Parses these bytes as a whole recording.
 pub fn parse(mut bytes: &[u8], path: &Path, overrides: &Metadata) -> Result<TraceFile, CliError> {
     of_text(&mut bytes, path, overrides)
 }
@@ -96,7 +96,8 @@ fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// SHA-256 of a file's bytes, hexadecimal. A device may have no end, and a pipe can be read once.
+/// Returns the SHA-256 of a file's bytes, hexadecimal. Only regular files: a device may have no end, and a pipe can be read
+/// once.
 pub fn sha256_of(path: &Path) -> io::Result<String> {
     if !path.metadata()?.is_file() {
         return Err(io::Error::other("expected a file, found a device, a pipe or a folder"));
@@ -110,7 +111,7 @@ pub fn sha256_of(path: &Path) -> io::Result<String> {
     }
 }
 
-/// Refuses a sensor's file, or a hand's, by its first bytes.
+/// Refuses the file of a sensor or of a hand, recognised by its first bytes.
 fn refuse_parameters(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
     if !sensor_file::is_one(bytes) {
         return Ok(());

@@ -9,10 +9,10 @@ use crate::sensor_file;
 use crate::whole_file;
 use crate::whole_file::is_stdin;
 
-/// Bytes that tell what a file is.
+/// Number of first bytes by which the kind of a file is recognised.
 const HEAD: u64 = 4096;
 
-/// Refuses what this program made of recordings, which looks like a table, too.
+/// Refuses results of this program, which look like tables, too.
 pub fn refuse_results(path: &Path) -> Result<(), CliError> {
     let Some(head) = std::fs::File::open(path).ok().filter(|_| path.is_file()).and_then(head) else { return Ok(()) };
     let header = head.lines().next().unwrap_or_default();
@@ -30,14 +30,14 @@ pub fn refuse_results(path: &Path) -> Result<(), CliError> {
     Err(CliError::Input(format!("{} {what}", path.display())))
 }
 
-/// The first bytes of a file as text.
+/// Returns the first bytes of a file as text.
 fn head(file: std::fs::File) -> Option<String> {
     let mut bytes = Vec::new();
     file.take(HEAD).read_to_end(&mut bytes).ok()?;
     Some(String::from_utf8_lossy(&bytes).into_owned())
 }
 
-/// Reads files as a lab writes them.
+/// Reads a lab's files.
 pub fn read(paths: &[PathBuf], recipe: &Recipe) -> Result<Vec<Table>, CliError> {
     if paths.iter().filter(|path| is_stdin(path)).count() > 1 {
         return Err(CliError::Arguments("FILE: - may stand there once".into()));
@@ -49,17 +49,17 @@ pub fn read(paths: &[PathBuf], recipe: &Recipe) -> Result<Vec<Table>, CliError> 
     paths.iter().enumerate().map(table).collect()
 }
 
-/// The command that imports files as planned, ready for a shell.
+/// Returns the command that imports files as planned, quoted for a shell.
 pub fn command(paths: &[PathBuf], tables: &[Table], plan: &Plan) -> String {
     command_of(paths, &plan.recipe(tables), &[])
 }
 
-/// The command that imports files by a recipe, with further flags.
+/// Returns the command that imports files by a recipe, with further flags.
 pub fn command_of(paths: &[PathBuf], recipe: &Recipe, flags: &[&str]) -> String {
     let mut words = vec!["ohmstrain".to_owned(), "import".to_owned()];
     for path in paths {
         let path = path.display().to_string();
-        // What begins with a hyphen would be taken for a flag.
+        // A path that begins with a hyphen would be taken for a flag.
         words.push(if path.starts_with('-') && path != "-" { format!("./{path}") } else { path });
     }
     words.extend(recipe.arguments());

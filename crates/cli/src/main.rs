@@ -50,7 +50,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Reports the error in the arguments, with the command's example if something is missing; or prints help.
+/// Reports an error in the arguments, with the command's example if an argument is missing; or prints help.
 fn refused(mut error: clap::Error) -> ExitCode {
     let mut words = std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned());
     let command = words.find(|word| !word.starts_with('-'));
@@ -59,7 +59,7 @@ fn refused(mut error: clap::Error) -> ExitCode {
         error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![answer.into()]));
     }
     let is_plain = std::env::args_os().all(|arg| matches!(printable(&arg.to_string_lossy()), Cow::Borrowed(_)));
-    // In colours, unless arguments that it quotes would colour it.
+    // In colours, unless an argument that the message quotes contains escape sequences.
     let _ = if is_plain || !error.use_stderr() {
         error.print()
     } else {

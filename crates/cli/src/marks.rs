@@ -1,4 +1,4 @@
-//! Strains that are known at times, in place of a reference: files of marks, and recordings that have their own.
+//! Strains known at certain times, in place of a reference: from files of marks, or from the recordings themselves.
 
 use std::path::{Path, PathBuf};
 
@@ -10,12 +10,12 @@ use ohmstrain_bench_data::ReferenceQuantity;
 use crate::error::CliError;
 use crate::whole_file;
 
-/// Columns of a file of marks, with that of the strain's standard deviation.
+/// Columns of a file of marks: strain, and its standard deviation.
 const STRAINS: [(&str, &str, ReferenceQuantity); 2] =
     [("strain", "strain_sd", ReferenceQuantity::Strain), ("angle_deg", "angle_sd", ReferenceQuantity::AngleDeg)];
 
-/// Reads the marks of a recording: a CSV with the columns `time_s`, `strain` (or `angle_deg`) and, if there are any, `until_s` and
-/// `strain_sd` (`angle_sd`).
+/// Reads the marks of a recording from a CSV file with the columns `time_s`, `strain` (or `angle_deg`) and, optionally,
+/// `until_s` and `strain_sd` (`angle_sd`).
 fn read(path: &Path, recording: usize) -> Result<Marked, CliError> {
     let name = path.display().to_string();
     let wrong = |error: csv::Error| CliError::Input(format!("{name}: {error}"));
@@ -39,7 +39,7 @@ fn read(path: &Path, recording: usize) -> Result<Marked, CliError> {
     Ok(Marked { recording, name, quantity: columns.quantity, marks, lines })
 }
 
-/// Places of the columns.
+/// Indices of the columns.
 struct Columns {
     time: usize,
     until: Option<usize>,
@@ -62,7 +62,7 @@ impl Columns {
         STRAINS.iter().find_map(of_quantity)
     }
 
-    /// A row's mark. An empty cell of an optional column stands for nothing known.
+    /// Returns the mark of a row. An empty cell of an optional column is an unknown value.
     fn mark(&self, row: &StringRecord) -> Result<Mark, String> {
         let cell = |place: usize| row.get(place).unwrap_or("").trim();
         let number = |place: usize, name: &str| {
@@ -81,7 +81,7 @@ impl Columns {
     }
 }
 
-/// Marks of recordings: those of files, one for each recording, or else those that recordings have themselves.
+/// Returns the marks of recordings: from files, one per recording, or else from the recordings themselves.
 pub fn of_recordings(recordings: &[TraceFile], files: &[PathBuf]) -> Result<Vec<Marked>, CliError> {
     if files.is_empty() {
         let own = recordings.iter().enumerate().filter_map(|(place, recording)| Marked::of_trace(place, recording));
@@ -97,7 +97,7 @@ pub fn of_recordings(recordings: &[TraceFile], files: &[PathBuf]) -> Result<Vec<
     files.iter().enumerate().map(|(place, path)| read(path, place)).collect()
 }
 
-/// Gives recordings the references that their marks make; says what those are.
+/// Turns the marks of recordings into references, and describes these.
 pub fn take(recordings: &mut [TraceFile], marked: &[Marked]) -> Result<Vec<String>, CliError> {
     let names: Vec<String> = marked.iter().map(|one| recordings[one.recording].name.clone()).collect();
     let found = take_marks(recordings, marked).map_err(|error| match error {

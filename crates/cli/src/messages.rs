@@ -1,11 +1,11 @@
-//! Messages on stderr, and the amount of them.
+//! Messages on stderr, and their verbosity.
 
 use std::io::{self, Write};
 use std::sync::{Mutex, PoisonError};
 
 use crate::printable::printable;
 
-/// Amount of messages besides errors.
+/// Verbosity of messages other than errors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Verbosity {
     /// Nothing.
@@ -13,11 +13,11 @@ pub enum Verbosity {
     /// Remarks, warnings and progress.
     #[default]
     Usual,
-    /// Steps of the work with their times, too.
+    /// Steps of the work with their times, in addition.
     Detailed,
 }
 
-/// Destination of a command's messages: stderr, or for one recording of many, a list of its own for the warnings.
+/// Destination of a command's messages: stderr, or a list of warnings for one recording of many.
 pub struct Messages {
     verbosity: Verbosity,
     warnings: Option<Mutex<Vec<String>>>,
@@ -29,12 +29,12 @@ impl Messages {
         Self { verbosity, warnings: None }
     }
 
-    /// Warnings into a list; remarks nowhere.
+    /// Collects warnings in a list, and drops remarks.
     pub const fn kept(verbosity: Verbosity) -> Self {
         Self { verbosity, warnings: Some(Mutex::new(Vec::new())) }
     }
 
-    /// The warnings that were kept.
+    /// Returns the warnings that were collected.
     pub fn into_warnings(self) -> Vec<String> {
         self.warnings.map_or_else(Vec::new, |kept| kept.into_inner().unwrap_or_else(PoisonError::into_inner))
     }
@@ -51,7 +51,7 @@ impl Messages {
 
     /// Prints an error on stderr.
     pub fn error(text: &str) {
-        // `eprintln!` would panic if whoever read stderr has left.
+        // `eprintln!` would panic if the reader of stderr has closed it.
         let _ = writeln!(io::stderr(), "ohmstrain: {}", printable(text));
     }
 
@@ -62,14 +62,14 @@ impl Messages {
         }
     }
 
-    /// Prints the present step of the work, if details are wanted.
+    /// Prints the present step of the work, if details are requested.
     pub fn detail(&self, text: &str) {
         if self.verbosity == Verbosity::Detailed {
             self.remark(text);
         }
     }
 
-    /// Prints, or keeps, a warning that casts doubt on a result.
+    /// Prints or collects a warning that casts doubt on a result.
     pub fn warning(&self, text: &str) {
         match &self.warnings {
             Some(_) if self.is_quiet() => {}

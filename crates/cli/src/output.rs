@@ -1,7 +1,7 @@
 //! Output of commands: stdout, and files.
 //!
-//! A command claims its files before the work, so that a name that cannot be written costs no time, makes their contents,
-//! and publishes all of them at its end. A command that fails leaves the files as they were.
+//! A command claims its files before the work, so that an unusable name costs no time. Then it produces their contents, and
+//! publishes all of them at its end. A command that fails leaves the files as they were.
 
 mod kind;
 mod place;
@@ -54,17 +54,18 @@ struct Claimed {
 }
 
 impl Outputs {
-    /// The outputs of a command that reads `inputs`. With `force` they replace files of another kind, but never an input.
+    /// Creates the outputs of a command that reads `inputs`. With `force` they replace files of other kinds, but never an
+    /// input.
     pub fn new<'a>(force: bool, inputs: impl IntoIterator<Item = &'a PathBuf>) -> Self {
         let known = |path: &'a PathBuf| Some((path.clone(), Identity::of(path)?));
         let inputs = inputs.into_iter().filter_map(known).collect();
         Self { force, inputs, files: Vec::new(), folders: Vec::new(), published: false }
     }
 
-    /// Makes a folder and the folders above it; those that are new go again, unless something is published.
+    /// Creates a folder and its parents; new folders are removed again unless something is published.
     ///
     /// # Errors
-    /// If that cannot be done.
+    /// If a folder cannot be created.
     pub fn folder(&mut self, path: &Path) -> Result<(), CliError> {
         refuse_stdout(path)?;
         let is_new = |folder: &&Path| !folder.as_os_str().is_empty() && !folder.exists();
@@ -82,7 +83,7 @@ impl Outputs {
         self.claim_table(path, kind, &[])
     }
 
-    /// Claims a file, unless there is none, or `-` means stdout.
+    /// Claims a file; `None` if there is no path, or if `-` stands for stdout.
     ///
     /// # Errors
     /// As [`Outputs::claim`].
@@ -90,7 +91,7 @@ impl Outputs {
         path.filter(|path| !is_stdout(path)).map(|path| self.claim(path, kind)).transpose()
     }
 
-    /// Claims a file for a table with these columns: another with the same ones is this program's.
+    /// Claims a file for a table with these columns; an existing table with the same columns counts as this program's.
     ///
     /// # Errors
     /// As [`Outputs::claim`].
@@ -141,7 +142,8 @@ impl Outputs {
         }
     }
 
-    /// A file to write bit by bit: it is published with the others, or, if it `grows`, is seen while it is written.
+    /// Opens a file that is written piece by piece. It is published with the others, or, if it `grows`, is visible while it is
+    /// written.
     ///
     /// # Errors
     /// If it cannot be written.
@@ -155,7 +157,7 @@ impl Outputs {
         Ok((file, claimed.path.clone()))
     }
 
-    /// Publishes this content of a file; prints it if none was claimed.
+    /// Publishes the content of one file, or prints it if none was claimed.
     pub fn publish_or_print(mut self, claim: Option<Claim>, content: Vec<u8>) -> Result<(), CliError> {
         match claim {
             Some(claim) => {
@@ -166,13 +168,13 @@ impl Outputs {
         }
     }
 
-    /// Writes all that was put: each file whole, and nothing before everything lies ready beside its place.
+    /// Publishes all contents: each file as a whole, and none before all are complete beside their places.
     pub fn publish(mut self) -> Result<(), CliError> {
         for file in self.files.iter().filter(|file| file.content.is_some() || file.begun.is_some()) {
             self.check_kind(file)?;
         }
         let mut whole = Vec::new();
-        // A device may still fail; taking a place hardly does.
+        // Devices come last, just before the renames: writing to them may still fail, a rename hardly does.
         self.files.sort_by_key(|file| matches!(file.place, Destination::Through(_)));
         for file in &mut self.files {
             if let Some(content) = file.content.take() {
@@ -190,7 +192,7 @@ impl Outputs {
 impl Drop for Outputs {
     fn drop(&mut self) {
         if !self.published {
-            // One that somebody has put something into meanwhile stays.
+            // A folder that somebody else has put a file into stays.
             self.folders.iter().rev().for_each(|folder| drop(fs::remove_dir(folder)));
         }
     }
@@ -210,13 +212,13 @@ pub fn refuse_stdout(path: &Path) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Writes an object as JSON. `schema` is the version of what it has: names are added without another version; one that
-/// goes or changes its meaning brings the next.
+/// Writes an object as JSON. `schema` is the version of its fields: a new field keeps the version; a field that disappears or
+/// changes its meaning increases it.
 pub fn json(out: &mut dyn Write, schema: u32, content: &impl Serialize) -> Result<(), CliError> {
     #[derive(Serialize)]
     struct Versioned<'a, T> {
         schema: u32,
-        /// Program and version.
+        /// Name and version of the program.
         made_by: &'static str,
         #[serde(flatten)]
         content: &'a T,
@@ -226,14 +228,14 @@ pub fn json(out: &mut dyn Write, schema: u32, content: &impl Serialize) -> Resul
     Ok(writeln!(out, "{}", printable_json(&text))?)
 }
 
-/// Writes text for people to stdout, as a terminal may show it.
+/// Writes text for people to stdout, in printable form.
 pub fn print(fill: impl FnOnce(&mut dyn Write) -> Result<(), CliError>) -> Result<(), CliError> {
     let mut text = Vec::new();
     fill(&mut text)?;
     print_data(printable_lines(&String::from_utf8_lossy(&text)).as_bytes())
 }
 
-/// Writes data to stdout, as they are.
+/// Writes data to stdout, unchanged.
 pub fn print_data(data: &[u8]) -> Result<(), CliError> {
     let mut out = io::stdout().lock();
     out.write_all(data)?;

@@ -1,4 +1,4 @@
-//! Tables as Parquet: optional columns of numbers and of words, row by row.
+//! Tables as Parquet: optional columns of numbers and of text, row by row.
 
 use std::fs::File;
 use std::io::{self, Write};
@@ -15,25 +15,25 @@ use parquet::schema::types::{Type, TypePtr};
 use crate::output::is_this_program;
 use ohmstrain::MADE_BY;
 
-/// Rows that are held until they are written.
+/// Number of rows that are buffered until they are written.
 const ROWS_AT_ONCE: usize = 1 << 16;
 
-/// Writes a table. Cells come row by row, in the order of the columns.
+/// Writer of a table. Cells arrive row by row, in the order of the columns.
 pub struct ParquetTable<W: Write + Send> {
     out: SerializedFileWriter<W>,
     columns: Vec<Cells>,
-    /// The column of the next cell.
+    /// Index of the column of the next cell.
     next: usize,
 }
 
-/// Cells that wait, a level 0 for each that is unknown.
+/// Buffered cells, with definition level 0 for each unknown one.
 enum Cells {
     Numbers(Vec<f64>, Vec<i16>),
     Words(Vec<ByteArray>, Vec<i16>),
 }
 
 impl<W: Write + Send> ParquetTable<W> {
-    /// A table with columns of these names, and whether they are numbers.
+    /// Creates a table; each column has a name and is numeric if true.
     pub fn new<'a>(out: W, columns: impl Iterator<Item = (&'a str, bool)>) -> io::Result<Self> {
         let (mut fields, mut cells) = (Vec::new(), Vec::new());
         for (name, is_number) in columns {
@@ -50,7 +50,7 @@ impl<W: Write + Send> ParquetTable<W> {
         Ok(Self { out, columns: cells, next: 0 })
     }
 
-    /// A cell with a number; an empty one for NaN.
+    /// Appends a cell with a number; an empty one for NaN.
     pub fn number(&mut self, value: f64) {
         if let Some(Cells::Numbers(values, levels)) = self.columns.get_mut(self.next) {
             levels.push(i16::from(!value.is_nan()));
@@ -59,7 +59,7 @@ impl<W: Write + Send> ParquetTable<W> {
         self.next += 1;
     }
 
-    /// A cell with text, or an empty one.
+    /// Appends a cell with text, or an empty one.
     pub fn text(&mut self, text: Option<&str>) {
         if let Some(Cells::Words(values, levels)) = self.columns.get_mut(self.next) {
             levels.push(i16::from(text.is_some()));
@@ -100,7 +100,7 @@ impl Cells {
         }
     }
 
-    /// Writes all that wait.
+    /// Writes all buffered cells.
     fn write<W: Write + Send>(&mut self, group: &mut SerializedRowGroupWriter<W>) -> Result<(), ParquetError> {
         let Some(mut column) = group.next_column()? else { return Ok(()) };
         match self {
@@ -119,7 +119,7 @@ impl Cells {
     }
 }
 
-/// Names of the columns of a table that this program wrote; `None` of any other file.
+/// Returns the names of the columns of a table that this program wrote; `None` for any other file.
 pub fn columns_of_ours(file: File) -> Option<Vec<String>> {
     let reader = SerializedFileReader::new(file).ok()?;
     let metadata = reader.metadata().file_metadata();
@@ -128,7 +128,7 @@ pub fn columns_of_ours(file: File) -> Option<Vec<String>> {
     is_ours.then(|| metadata.schema().get_fields().iter().map(name).collect())
 }
 
-/// Returns the error of the writer below; a closed pipe stays one.
+/// Returns the error of the underlying writer, so that a closed pipe stays one.
 fn failed(error: ParquetError) -> io::Error {
     match error {
         ParquetError::External(source) => match source.downcast::<io::Error>() {

@@ -1,4 +1,4 @@
-//! Doubts about the recordings of a calibration, refused or warned of.
+//! Doubts about the recordings of a calibration: some are refused, others warned of.
 
 use ohmstrain::trace::{TraceFile, doubt_text, first_distrusted_rows};
 use ohmstrain::{CalibrationDoubt, Distrusted};
@@ -6,7 +6,7 @@ use ohmstrain::{CalibrationDoubt, Distrusted};
 use crate::error::CliError;
 use crate::messages::Messages;
 
-/// Refuses what has to be answered, warns of the rest.
+/// Refuses doubts that need an answer, and warns of the others.
 pub fn heed(recordings: &[TraceFile], doubts: &[CalibrationDoubt], messages: &Messages) -> Result<(), CliError> {
     for doubt in doubts {
         let text = doubt_text(doubt, recordings);
@@ -18,7 +18,7 @@ pub fn heed(recordings: &[TraceFile], doubts: &[CalibrationDoubt], messages: &Me
     Ok(())
 }
 
-/// Names the first rows that take no part in a calibration.
+/// Names the first rows that are excluded from a calibration.
 pub fn warn_of_distrusted(recordings: &[TraceFile], rows: &[Distrusted], messages: &Messages) {
     first_distrusted_rows(rows, recordings).iter().for_each(|line| messages.warning(line));
 }

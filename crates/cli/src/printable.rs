@@ -1,12 +1,12 @@
-//! Text of files, devices and file names as a terminal may show it.
+//! Printable form of text from files, devices and file names, for a terminal.
 //!
-//! Everything for people passes here on its way out: messages in [`Messages`](crate::messages::Messages), tables in
+//! All text for people passes through here on its way out: messages in [`Messages`](crate::messages::Messages), tables in
 //! [`print`](crate::output::print), the picture of `live`, titles of reports. Data (rows of CSV, JSON) does not.
 
 use std::borrow::Cow;
 use std::fmt::Write;
 
-/// One line of text. Characters that move the cursor, colour, reorder or hide what stands around them become escapes such as
+/// Escapes one line of text. Characters that move the cursor, colour, reorder or hide their surroundings become escapes such as
 /// `\u{1b}`; so does an end of line.
 pub fn printable(text: &str) -> Cow<'_, str> {
     if text.chars().all(is_shown) {
@@ -16,12 +16,12 @@ pub fn printable(text: &str) -> Cow<'_, str> {
     Cow::Owned(text.chars().map(escaped).collect())
 }
 
-/// Several lines of text, each as [`printable`] has it.
+/// Escapes several lines of text, each as [`printable`] does.
 pub fn printable_lines(text: &str) -> String {
     text.split('\n').map(printable).collect::<Vec<_>>().join("\n")
 }
 
-/// The same JSON, with the escapes of JSON in its strings.
+/// Escapes JSON in the same way, with the escapes of JSON in its strings.
 pub fn printable_json(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
@@ -36,13 +36,13 @@ pub fn printable_json(text: &str) -> String {
     out
 }
 
-/// True if a terminal shows a character as itself: all that `str::escape_debug` leaves as it is, and quotation marks. A mark that
-/// combines with the letter before it is one of them.
+/// True if a terminal shows a character as itself: all that `str::escape_debug` leaves as it is, and quotation marks. That
+/// includes a combining mark after a letter.
 fn is_shown(c: char) -> bool {
     if c.is_ascii() {
         return c == ' ' || c.is_ascii_graphic();
     }
-    // Behind another character, because a combining mark is escaped at the start of a text.
+    // Tested behind another character, because a combining mark is escaped at the start of a text.
     let mut behind = String::from("-");
     behind.push(c);
     behind.escape_debug().eq(behind.chars())
@@ -59,7 +59,7 @@ mod tests {
         let cases = [
             ("\u{1b}[31mred", "\\u{1b}[31mred"),
             ("a\r\n\tb\u{7}", "a\\r\\n\\tb\\u{7}"),
-            // A control of eight bits, a text that runs backwards, a blank of no width, other ends of line.
+            // An 8-bit control, right-to-left text, a zero-width space, other line ends.
             ("\u{9b}2J", "\\u{9b}2J"),
             ("\u{202e}vsc.exe\u{2066}", "\\u{202e}vsc.exe\\u{2066}"),
             ("a\u{200b}b\u{feff}\u{2028}\u{85}", "a\\u{200b}b\\u{feff}\\u{2028}\\u{85}"),

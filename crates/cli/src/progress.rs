@@ -13,7 +13,7 @@ pub struct Progress<'a> {
 }
 
 impl<'a> Progress<'a> {
-    /// A bar with a heading.
+    /// Creates a bar with a heading.
     pub fn new(heading: &'static str, messages: &'a Messages) -> Self {
         let shown = messages.shows_progress();
         let target = if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
@@ -27,7 +27,7 @@ impl<'a> Progress<'a> {
         progress
     }
 
-    /// A bar over so many bytes of recordings, with the time that is left.
+    /// Creates a bar over this many bytes of recordings, with the remaining time.
     pub fn over_bytes(heading: &'static str, bytes: u64, messages: &'a Messages) -> Self {
         let progress = Self::new(heading, messages);
         if let Ok(style) = ProgressStyle::with_template("{msg:32} {wide_bar} {percent:>3} %, {eta} left") {
@@ -37,7 +37,7 @@ impl<'a> Progress<'a> {
         progress
     }
 
-    /// Counts what is done.
+    /// Advances the bar.
     pub fn advance(&self, bytes: u64, message: String) {
         self.detail(&message);
         self.bar.set_message(message);
@@ -49,12 +49,12 @@ impl<'a> Progress<'a> {
         self.messages
     }
 
-    /// Prints around the bar.
+    /// Prints with the bar hidden.
     pub fn around<T>(&self, print: impl FnOnce() -> T) -> T {
         self.bar.suspend(print)
     }
 
-    /// Shows the present step of the work, with nothing to count.
+    /// Shows the present step of work that cannot be counted.
     pub fn doing(&self, what: &'static str) {
         self.bar.set_message(what);
         self.detail(what);
@@ -64,7 +64,7 @@ impl<'a> Progress<'a> {
         self.messages.detail(&format!("{:.1} s: {what}", self.start.elapsed().as_secs_f64()));
     }
 
-    /// Shows where a calibration is.
+    /// Shows the stage of a calibration.
     pub fn calibrating(&self, stage: Stage) {
         match stage {
             Stage::LeftOut => self.doing("checking parts left out"),

@@ -1,4 +1,4 @@
-//! Protocols for a person, as files.
+//! Files of protocols for a person.
 
 use std::path::Path;
 
@@ -9,9 +9,10 @@ use serde::{Deserialize, Serialize};
 use crate::error::CliError;
 use crate::whole_file;
 
-/// The version of the file.
+/// Version of the file format.
 const FORMAT: u32 = 1;
-/// Standard deviation of how well a person keeps a position, where none is stated, as a share of the span of all.
+/// Standard deviation with which a person keeps a position, as a share of the span of all positions; for positions without a
+/// stated one.
 const KEPT_SD: f64 = 0.02;
 
 /// `protocol.toml`.
@@ -21,10 +22,10 @@ struct File {
     format: u32,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     made_by: Option<String>,
-    /// Joints with values of their own.
+    /// Joints that have values of their own.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     joints: Vec<String>,
-    /// Number of times that the steps are gone through.
+    /// Number of times that the steps are repeated.
     #[serde(default = "once", skip_serializing_if = "is_once")]
     repeat: usize,
     positions: Vec<WrittenPosition>,
@@ -41,7 +42,7 @@ const fn is_once(repeat: &usize) -> bool {
     *repeat == 1
 }
 
-/// A position: a strain or an angle, of all joints or of each.
+/// A position: a strain or an angle, common to all joints or one for each.
 #[derive(Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct WrittenPosition {
@@ -134,7 +135,7 @@ impl File {
     }
 }
 
-/// A protocol without steps; a position whose standard deviation is NaN gets a share of the span of all.
+/// Creates a protocol without steps; a position whose standard deviation is NaN gets a share of the span of all positions.
 pub fn pacing(quantity: ReferenceQuantity, joints: Vec<String>, positions: Vec<(String, Vec<f64>, f64)>) -> Pacing {
     let all = || positions.iter().flat_map(|(_, values, _)| values.iter().copied());
     let span = all().fold(f64::NEG_INFINITY, f64::max) - all().fold(f64::INFINITY, f64::min);
@@ -143,10 +144,10 @@ pub fn pacing(quantity: ReferenceQuantity, joints: Vec<String>, positions: Vec<(
     Pacing { quantity, joints, positions: positions.into_iter().map(position).collect(), steps: Vec::new() }
 }
 
-/// A protocol as text.
+/// Formats a protocol as the text of a file.
 ///
 /// # Errors
-/// If it cannot be written.
+/// If it cannot be serialised.
 pub fn text(pacing: &Pacing) -> Result<String, CliError> {
     let values = |position: &Position| match &position.values[..] {
         [one] => Values::One(*one),

@@ -7,34 +7,34 @@ use tempfile::SpooledTempFile;
 
 use crate::error::CliError;
 
-/// Bytes that wait in memory; more of them wait in a temporary file.
+/// Bytes that are buffered in memory; more of them go to a temporary file.
 pub const WAIT_IN_MEMORY: usize = 16 << 20;
 
-/// The readings of a recording that may be longer than memory, and nothing else of it: what exceeds 16 MB waits in a temporary
-/// file, and rows are taken out of it by the thousand.
+/// Readings of a recording that may exceed memory, without its other columns. Bytes beyond 16 MB go to a temporary file, from
+/// which rows are read by the thousand.
 pub struct StoredReadings {
-    /// True if a row has, besides time and value, the deviation of a converter's reading and a byte for saturation.
+    /// True if a row contains, besides time and value, the deviation of a converter's reading and a byte for saturation.
     has_codes: bool,
     len: usize,
     kept: RefCell<Kept>,
 }
 
-/// The file, and the rows around the one that was asked for last.
+/// The file, and the rows around the one that was requested last.
 struct Kept {
     file: SpooledTempFile,
     first: usize,
     rows: Vec<(f64, Reading)>,
     bytes: Vec<u8>,
-    /// Error that keeps rows from being taken out again.
+    /// Error that prevents rows from being read back.
     failed: Option<io::Error>,
 }
 
-/// Rows taken out at once: those of a segment of the smoother, which goes through it twice.
+/// Rows that are read back at once: those of a segment of the smoother, which passes through it twice.
 const AT_ONCE: usize = 4096;
 const NUMBER: usize = size_of::<f64>();
 
 impl StoredReadings {
-    /// Reads what is left in `rows`, at least one.
+    /// Reads the remaining `rows`, at least one.
     pub fn collect<R: Read>(mut rows: TraceReader<R>) -> Result<Self, CliError> {
         let has_codes = rows.has_codes();
         let mut out = BufWriter::new(tempfile::spooled_tempfile(WAIT_IN_MEMORY));
@@ -59,17 +59,17 @@ impl StoredReadings {
         Ok(Self { has_codes, len, kept: RefCell::new(kept) })
     }
 
-    /// Number of rows.
+    /// Returns the number of rows.
     pub const fn len(&self) -> usize {
         self.len
     }
 
-    /// All readings as recorded; NaN where missing.
+    /// Returns all readings as recorded; NaN where missing.
     pub fn values(&self) -> impl Iterator<Item = f64> {
         (0..self.len).map(|row| self.row(row).1.value)
     }
 
-    /// Returns time, s, and reading of a row; NaN if it cannot be taken out, which [`Self::whole`] then reports.
+    /// Returns the time, s, and the reading of a row; NaN if it cannot be read back, which [`Self::whole`] then reports.
     pub fn row(&self, row: usize) -> (f64, Reading) {
         let mut kept = self.kept.borrow_mut();
         if kept.failed.is_none() && (kept.rows.is_empty() || row / AT_ONCE != kept.first / AT_ONCE) {
@@ -80,7 +80,7 @@ impl StoredReadings {
         known.unwrap_or((f64::NAN, Reading { value: f64::NAN, sd: 0.0, saturated: false }))
     }
 
-    /// Fails unless all requested rows could be taken out.
+    /// Fails unless all requested rows could be read back.
     pub fn whole(&self) -> Result<(), CliError> {
         self.kept.borrow().failed.as_ref().map_or(Ok(()), |error| Err(temporary(error)))
     }
@@ -110,12 +110,12 @@ fn unpacked(row: &[u8]) -> (f64, Reading) {
     (number(0).unwrap_or(f64::NAN), reading)
 }
 
-/// The temporary file fails, which is not a closed pipe.
+/// Creates the error of a temporary file, which is not a closed pipe.
 pub fn temporary(error: &io::Error) -> CliError {
     CliError::Other(format!("cannot keep rows in a temporary file: {error}"))
 }
 
-/// An error of a row; of one that is too late with what helps if a clock has started again.
+/// Creates the error of a row; for a row out of order, with advice on a clock that has restarted.
 pub fn late(error: TraceError, hint: &str) -> CliError {
     match error {
         TraceError::Content(fault) if fault.is_late => {
@@ -125,7 +125,7 @@ pub fn late(error: TraceError, hint: &str) -> CliError {
     }
 }
 
-/// A recording has ended before its first row.
+/// Creates the error of a recording that ends before its first row.
 pub fn no_row(file: &str, line: u64) -> CliError {
     let none = "expected at least one row of data, found the end of the file";
     CliError::Input(format!("{file}:{}: {none}", line + 1))
@@ -137,8 +137,8 @@ mod tests {
 
     use super::*;
 
-    /// Tests rows in a smoother's order: forward, then segment by segment backwards. Their number exceeds the memory for waiting
-    /// ones, or is small.
+    /// Tests rows in a smoother's order: forward, then segment by segment backwards. Their number exceeds the memory buffer, or
+    /// is small.
     #[test]
     fn rows_come_out_as_they_went_in() {
         for rows in [10, WAIT_IN_MEMORY / (2 * NUMBER) + 5000] {

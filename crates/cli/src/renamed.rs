@@ -1,10 +1,10 @@
-//! Replacements of flags that are gone, for users who still type them.
+//! Replacements of removed flags, for users who still type them.
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
-/// Commands of which estimates come.
+/// Commands that produce estimates.
 const ESTIMATE: [&str; 3] = ["filter", "smooth", "live"];
-/// Commands that read recordings and no stream.
+/// Commands that read recordings but no stream.
 const RECORDINGS: [&str; 5] = ["calibrate", "refine", "fit-law", "smooth", "evaluate"];
 
 /// Returns the replacement for an unknown flag that this command once had.

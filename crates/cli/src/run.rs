@@ -4,13 +4,14 @@ use ohmstrain::{Error, Estimate, EstimatorKind, FilterBuilder, Known, Sensor};
 use crate::args::{EstimateArgs, RestResistance, Without};
 use crate::error::CliError;
 
-/// A sensor's filter as the flags want it.
+/// Returns the builder of a sensor's filter with the settings of the flags.
 pub fn builder<'a>(sensor: &'a Sensor, args: &'a EstimateArgs) -> FilterBuilder<'a> {
     let builder = builder_anew(sensor, args).known(&args.known);
     args.initial_strain.map_or(builder, |strain| builder.initial_strain(strain))
 }
 
-/// Returns the builder for a device that has restarted: the known first row and strains on the first clock do not apply to it.
+/// Returns the builder for a device that has restarted: the known first row, and known strains on the first clock, do not apply
+/// to it.
 pub fn builder_anew<'a>(sensor: &'a Sensor, args: &'a EstimateArgs) -> FilterBuilder<'a> {
     let mut builder = sensor.filter();
     if let Some(kind) = args.estimator.chosen() {
@@ -37,7 +38,8 @@ pub fn builder_anew<'a>(sensor: &'a Sensor, args: &'a EstimateArgs) -> FilterBui
     builder
 }
 
-/// Returns the reading of the rested sensor for a recording whose first readings are `first`; `None` if it was not given, so that R₀ follows.
+/// Returns the reading of the rested sensor for a recording whose first readings are `first`; `None` if it was not given, so
+/// that the filter adapts R₀.
 pub fn rest_resistance(
     wanted: Option<RestResistance>,
     sensor: &Sensor,
@@ -59,18 +61,18 @@ pub fn rest_resistance(
     }
 }
 
-/// Refuses the R₀ that the first readings of a recording give.
+/// Creates the error of an R₀ that was computed from a recording's first readings and refused.
 pub fn of_first(refused: &Error, count: usize, file: &str) -> CliError {
     CliError::Input(format!("{file}: --rest-resistance first:{count}: {refused}"))
 }
 
-/// Median of the first `count` known readings.
+/// Returns the median of the first `count` known readings.
 pub fn median_of_first(count: usize, first: impl Iterator<Item = f64>, file: &str) -> Result<f64, CliError> {
     let none = || CliError::Input(format!("{file}: expected a reading among the first rows, found none"));
     median(first.filter(|value| value.is_finite()).take(count).collect()).ok_or_else(none)
 }
 
-/// Median of numbers; `None` if there is none.
+/// Returns the median of numbers; `None` if there are none.
 pub fn median(mut known: Vec<f64>) -> Option<f64> {
     known.sort_by(f64::total_cmp);
     match known.len() {
@@ -80,7 +82,7 @@ pub fn median(mut known: Vec<f64>) -> Option<f64> {
     }
 }
 
-/// Both passes over a recording.
+/// Results of both passes over a recording.
 pub struct Estimated {
     /// The filter's estimates, row by row.
     pub filtered: Vec<Estimate>,
@@ -88,7 +90,7 @@ pub struct Estimated {
     pub smoothed: Vec<Estimate>,
 }
 
-/// Filters and smooths a recording of which some strains are `known`; `kind` is the sensor's default unless another is wanted.
+/// Filters and smooths a recording in which some strains are `known`; `kind` replaces the sensor's default estimator.
 pub fn estimate(
     recording: &TraceFile,
     sensor: &Sensor,
@@ -119,7 +121,7 @@ pub fn estimate(
     Ok(Estimated { filtered, smoothed })
 }
 
-/// A filter's refusal of a row.
+/// Creates the error of a row that a filter refused.
 fn at_row(row: usize, error: Error) -> CliError {
     match error {
         Error::Step(source) => Error::Row { row, source }.into(),

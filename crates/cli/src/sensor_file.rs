@@ -5,10 +5,10 @@ use ohmstrain::{EstimatorKind, Sensor, SensorParams};
 use crate::error::CliError;
 use crate::whole_file;
 
-/// Description of a file that describes joints, for messages.
+/// Message for a file that describes a hand where a sensor is expected.
 pub const A_HAND: &str = "is the description of a hand, not of a sensor: give it to `ohmstrain hand`";
 
-/// Reads a sensor and checks that the estimator (or the file's choice) can be made of it.
+/// Reads a sensor and checks that the estimator, or the file's default one, can be built from it.
 pub fn read(path: &Path, estimator: Option<EstimatorKind>) -> Result<Sensor, CliError> {
     let name = path.display().to_string();
     let text = whole_file::text(path)?;
@@ -27,7 +27,7 @@ pub fn read(path: &Path, estimator: Option<EstimatorKind>) -> Result<Sensor, Cli
     sensor.map_err(|error| CliError::Input(error.in_file(&name)))
 }
 
-/// True if these are the first bytes of a sensor's parameters, or of a hand's description.
+/// True if these are the first bytes of a sensor's parameters or of a hand's description.
 pub fn is_one(bytes: &[u8]) -> bool {
     bytes.starts_with(b"format = ")
 }
@@ -42,18 +42,18 @@ pub fn is_of_a_hand(path: &Path) -> bool {
     path.is_file() && whole_file::text(path).is_ok_and(|text| is_hand(&text))
 }
 
-/// True if this is a recording: its first line that is no comment has names of columns.
+/// True if this is a recording: its first line that is not a comment contains names of columns.
 pub fn is_recording(text: &str) -> bool {
     let first = text.lines().find(|line| !line.trim().is_empty() && !line.starts_with('#')).unwrap_or("");
     first.contains(',') && first.split(',').any(|cell| matches!(cell.trim(), "time_s" | "time_us"))
 }
 
-/// A sensor with these parameters, or why it cannot be written.
+/// Creates a sensor with these parameters, or the error of parameters that cannot be written.
 pub fn checked(params: SensorParams) -> Result<Sensor, CliError> {
     Sensor::from_params(params).map_err(|error| CliError::Other(format!("cannot write parameters: {error}")))
 }
 
-/// A sensor as it is written.
+/// Formats a sensor as the text of its file.
 pub fn text(sensor: &Sensor) -> Result<String, CliError> {
     sensor.to_toml().map_err(|error| CliError::Other(format!("cannot write parameters: {error}")))
 }

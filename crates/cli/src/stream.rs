@@ -1,4 +1,4 @@
-//! Rows as they come: of a recording, or with `--skip-bad` of a device that prints other lines, too, and may restart.
+//! Rows as they arrive: of a recording, or with `--skip-bad` of a device that also prints other lines and may restart.
 
 use std::io::Read;
 
@@ -16,7 +16,7 @@ pub enum RowSource {
     Device(Box<DeviceReader<Source>>),
 }
 
-/// Opens what is to be filtered.
+/// Opens the input of `filter`.
 pub fn open(args: &FilterArgs) -> Result<RowSource, CliError> {
     let (text, metadata) = input::text_of(&args.trace_file, &args.setup.metadata(&args.estimate.units))?;
     let name = args.trace_file.display().to_string();
@@ -34,7 +34,7 @@ pub fn open(args: &FilterArgs) -> Result<RowSource, CliError> {
     }
 }
 
-/// A stream whose header did not come.
+/// Creates the error of a stream whose header did not arrive.
 fn without_header(error: TraceError) -> CliError {
     match error {
         TraceError::Content(content) => {
@@ -45,7 +45,7 @@ fn without_header(error: TraceError) -> CliError {
     }
 }
 
-/// `--header` has none of the columns.
+/// Creates the error of a `--header` that names none of the columns.
 fn of_header_flag(error: TraceError) -> CliError {
     match error {
         TraceError::Content(content) => {
@@ -56,7 +56,7 @@ fn of_header_flag(error: TraceError) -> CliError {
 }
 
 impl RowSource {
-    /// Name of the source, as messages call it.
+    /// Returns the name of the source in messages.
     pub fn file(&self) -> &str {
         match self {
             Self::Recording(rows) => rows.file(),
@@ -64,7 +64,7 @@ impl RowSource {
         }
     }
 
-    /// Physical line read last, counted from 1.
+    /// Returns the number of the physical line read last, counted from 1.
     pub fn line(&self) -> u64 {
         match self {
             Self::Recording(rows) => rows.line(),
@@ -72,7 +72,7 @@ impl RowSource {
         }
     }
 
-    /// Time of the last row, as it stood there.
+    /// Returns the time of the last row, as it was written.
     pub fn last_time(&self) -> Option<LastTime> {
         match self {
             Self::Recording(rows) => rows.last_time(),
@@ -80,7 +80,7 @@ impl RowSource {
         }
     }
 
-    /// Continues from the last time of the stream before; `false` if that counted in another unit.
+    /// Continues from the last time of the previous stream; returns `false` if that used another unit.
     pub fn go_on(&mut self, from: LastTime) -> bool {
         match self {
             Self::Recording(rows) => rows.go_on(from),

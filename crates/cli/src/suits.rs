@@ -1,4 +1,4 @@
-//! Doubts about what a sensor is given, refused or warned of.
+//! Doubts about a sensor's input: some are refused, others warned of.
 
 use ohmstrain::Interface::CommandLine;
 use ohmstrain::trace::TraceFile;
@@ -7,12 +7,12 @@ use ohmstrain::{Known, ReferenceDoubt, Sensor, UnitDoubt, unused_known};
 use crate::error::CliError;
 use crate::messages::Messages;
 
-/// Readings at the start of a file that are looked at before it is filtered.
+/// Number of readings at the start of a file that are checked before it is filtered.
 pub const FIRST_READINGS: usize = 100;
-/// Number of first readings if a reader waits for each row.
+/// Number of first readings that are checked if a reader waits for each row.
 pub const FIRST_LIVE_READINGS: usize = 20;
 
-/// Refuses readings in another unit than the sensor's; `header` is what messages call the recording's header.
+/// Refuses readings in another unit than the sensor's; `header` names the recording's header in messages.
 pub fn check_readings(
     header: &str,
     sensor: &Sensor,
@@ -30,14 +30,14 @@ pub fn check_reference(recording: &TraceFile, sensor: &Sensor) -> Result<(), Cli
     sensor.check_reference(truth).map_err(refused)
 }
 
-/// Warns of a strain to start at that the sensor never reports.
+/// Warns of an initial strain that the sensor never reports.
 pub fn warn_of_start(start: Option<f64>, sensor: &Sensor, messages: &Messages) {
     if let Some(Err(doubt)) = start.map(|start| sensor.check_start(start)) {
         messages.warning(&doubt.text(CommandLine));
     }
 }
 
-/// Warns of known strains that no row came for in a recording from the first to the last time, s.
+/// Warns of known strains without a row, in a recording whose first and last time, s, are `times`.
 pub fn warn_of_unused(known: &[Known], times: (f64, f64), file: &str, messages: &Messages) {
     for doubt in unused_known(known, times) {
         messages.warning(&format!("{file}: {}", doubt.text(CommandLine)));

@@ -1,4 +1,4 @@
-//! Files that are read as a whole: no more of them than there may be, so that a device that never ends is refused.
+//! Files that are read as a whole, up to a limit, so that an endless device is refused.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -8,8 +8,8 @@ use ohmstrain_bench_data::import::LARGEST_FILE;
 
 use crate::error::CliError;
 
-/// Bytes of a file of parameters, descriptions or a list of recordings: those of a hundred thousand recordings, and far above
-/// what this program writes.
+/// Largest size, bytes, of a file of parameters, a description or a list of recordings: room for a hundred thousand recordings,
+/// and far more than this program writes.
 const LARGEST_TEXT: u64 = 16 << 20;
 
 /// True if a path means stdin.
@@ -17,12 +17,12 @@ pub fn is_stdin(path: &Path) -> bool {
     path == Path::new("-")
 }
 
-/// A lab's file; `-` is stdin.
+/// Reads a lab's file; `-` is stdin.
 pub fn bytes(path: &Path) -> Result<Vec<u8>, CliError> {
     up_to(LARGEST_FILE, path, "take a part of it, or fewer columns")
 }
 
-/// A file of parameters, or another that people write.
+/// Reads a file of parameters, or another one that people write.
 pub fn text(path: &Path) -> Result<String, CliError> {
     let bytes = up_to(LARGEST_TEXT, path, "is it another file that was meant?")?;
     String::from_utf8(bytes).map_err(|_| {

@@ -1,5 +1,4 @@
-//! Whatever is wrong with an input: one line that says where, what was expected and what was found; no panic, no half
-//! file, no half row.
+//! Errors in inputs: one line names the place, the expected and the found content; no panic, no partial file, no partial row.
 
 use crate::common::{Bench, change_rows};
 
@@ -10,7 +9,7 @@ const ARGUMENTS: i32 = 2;
 /// Exit code for the rest: files that cannot be read or written.
 const OTHER: i32 = 1;
 
-/// Content of the output before: a sensor file that may be replaced.
+/// Content of the previous output: a sensor file that may be replaced.
 const OLD: &str = "format = 9\nmade_by = \"ohmstrain 0.0.1\"\nquantity = \"strain\"\n";
 
 /// The commands that read a recording, each with a file that it would write.
@@ -21,7 +20,7 @@ const READERS: [&[&str]; 4] = [
     &["calibrate", "bad.csv", "-o", "old.toml", "--report", "new.html"],
 ];
 
-/// Runs a command that has to fail, and looks after the files: an old one keeps its content, no new one appears.
+/// Runs a command that must fail, and checks the files: an old one keeps its content, no new one appears.
 #[track_caller]
 fn fails(bench: &Bench, arguments: &[&str], code: i32, message: &str) {
     bench.write("old.toml", OLD);
@@ -34,22 +33,22 @@ fn fails(bench: &Bench, arguments: &[&str], code: i32, message: &str) {
 /// Three lines above the first row, so that a line number is not a row number.
 const HEADER: &str = "# material = silicone\n# gauge_length_mm = 30\ntime_s,resistance_ohm,strain\n";
 
-/// A recording whose row at line 6 is `row`, between good ones.
+/// Returns a recording with `row` at line 6, between good rows.
 fn with_row(row: &str) -> Vec<u8> {
     format!("{HEADER}0.0,1600,0.0\n0.1,1610,0.01\n{row}\n0.3,1630,0.03\n").into_bytes()
 }
 
-/// The same with another header.
+/// Returns the same with another header.
 fn with_header(header: &str, row: &str) -> Vec<u8> {
     format!("# material = silicone\n{header}\n{row}\n").into_bytes()
 }
 
-/// ASCII text in UTF-16, as a spreadsheet may save it.
+/// Encodes ASCII text in UTF-16, as a spreadsheet may save it.
 fn utf_16(text: &str, mark: [u8; 2], order: fn(u16) -> [u8; 2]) -> Vec<u8> {
     mark.into_iter().chain(text.encode_utf16().flat_map(order)).collect()
 }
 
-/// Number of the header's line.
+/// Returns the number of the header's line.
 fn header_line(trace: &str) -> usize {
     1 + trace.lines().position(|line| line.starts_with("time_s")).unwrap()
 }
@@ -128,7 +127,7 @@ fn a_recording_that_is_none_is_refused_alike_by_every_command() {
             with_header("# joint = prestrain=0\ntime_s,resistance_ohm,strain", "0,1600,0"),
             "2: expected `moment_arm_mm=…`, found none".into(),
         ),
-        // No text.
+        // Not text.
         (binary, "1: expected UTF-8 text, found binary data (a NUL byte)".into()),
         (latin_1, "5: expected UTF-8 text, found binary data (bytes that are not UTF-8)".into()),
         (utf_16(HEADER, [0xff, 0xfe], u16::to_le_bytes), "1: expected UTF-8 text, found UTF-16 text".into()),
@@ -137,10 +136,10 @@ fn a_recording_that_is_none_is_refused_alike_by_every_command() {
     let bench = Bench::calibrated();
     for (content, message) in cases {
         bench.write("bad.csv", &content);
-        // What is written in another way altogether is somebody else's file.
+        // A file in an entirely different encoding belongs to somebody else.
         let is_foreign = message.contains(one_of) || message.contains("UTF-8 text");
         let hint = if is_foreign { "; see `ohmstrain inspect bad.csv`" } else { "" };
-        // A stream may have started again.
+        // A stream may have restarted.
         let is_back = message.contains("expected a time after");
         let anew = "; if the clock has started again there, --skip-bad goes on with another filter";
         let in_parts =
@@ -236,7 +235,7 @@ fn readings_in_another_unit_than_the_sensors_are_refused() {
 fn a_sensor_file_that_is_none_is_refused_alike_by_every_command() {
     let bench = Bench::calibrated();
     let (sensor, trace) = (bench.read("sensor.toml"), bench.read("trace.csv"));
-    /// Replaces the first line that starts with `start`; the line's number.
+    /// Replaces the first line that starts with `start`; returns its number.
     fn swap(sensor: &str, start: &str, by: &str) -> (String, usize) {
         let index = sensor.lines().position(|line| line.starts_with(start)).unwrap();
         let mut lines: Vec<&str> = sensor.lines().collect();
@@ -257,7 +256,7 @@ fn a_sensor_file_that_is_none_is_refused_alike_by_every_command() {
     let cases: Vec<(Vec<u8>, String)> = vec![
         (unknown.0.into(), format!(":{}: column 1: unknown field `colour`, expected one of `format`, ", unknown.1)),
         (in_table.0.into(), format!(":{}: column 1: unknown field `tau_min`, expected one of `tau_s`, ", in_table.1)),
-        // What a newer version has is not unknown but newer.
+        // A field of a newer version is reported as newer, not as unknown.
         (newer.0.into(), ":1: field `format`: expected version 9, found 10".into()),
         (word.0.into(), format!(":{}: column 16: invalid type: string \"high\", expected f64", word.1)),
         (
@@ -299,7 +298,7 @@ fn a_sensor_file_that_is_none_is_refused_alike_by_every_command() {
     }
 }
 
-/// Checks like `fails`, for messages that end with words of the operating system.
+/// Checks like `fails`, for messages that end with the operating system's text.
 #[track_caller]
 fn fails_on_files(bench: &Bench, arguments: &[&str], message: &str) {
     let before = bench.files();
@@ -321,7 +320,7 @@ fn a_file_that_cannot_be_read_is_named() {
     fails_on_files(&bench, &["calibrate", "trace.csv", "none.csv", "-o", "new.toml"], "cannot read none.csv");
 }
 
-/// Nothing can be made below a regular file, whoever asks.
+/// Nothing can be created below a regular file, by any user.
 #[test]
 fn an_output_that_cannot_be_written_leaves_nothing_behind() {
     let bench = Bench::calibrated();
@@ -342,7 +341,7 @@ fn an_output_that_cannot_be_written_leaves_nothing_behind() {
     assert_eq!(bench.read("file"), "what was here before");
 }
 
-/// The parser of the command line may take several lines to help; its first one says what is wrong.
+/// The argument parser may print several lines of help; the first one names the error.
 #[test]
 fn an_argument_that_cannot_be_is_named() {
     let filter = ["filter", "trace.csv", "--sensor", "sensor.toml"];
@@ -399,7 +398,7 @@ fn an_argument_that_cannot_be_is_named() {
     assert!(run.stderr.lines().count() == 1 && run.stderr.ends_with("found `colour`\n"), "{}", run.stderr);
 }
 
-/// The name of a flag that is gone leads to what does the same now, in commands that had it.
+/// The name of a removed flag leads to its replacement, in commands that had it.
 #[test]
 fn a_flag_that_is_gone_leads_to_another() {
     let bench = Bench::calibrated();

@@ -1,10 +1,10 @@
-//! Many recordings: what comes of each, what is done again, and what is refused.
+//! Batches of recordings: their results, repetitions, and refusals.
 
 use std::fs;
 
 use crate::common::Bench;
 
-/// Recordings of the same readings at other times, a sensor, and two files that are no recordings.
+/// Returns a folder with recordings of the same readings at other times, a sensor, and two files that are not recordings.
 fn folder() -> Bench {
     let bench = Bench::calibrated();
     let trace = bench.read("trace.csv");
@@ -17,7 +17,7 @@ fn folder() -> Bench {
 
 const SMOOTH: [&str; 9] = ["-q", "batch", "smooth", "--sensor", "sensor.toml", "-o", "out", "--glob", "in/**/*.csv"];
 
-/// One row of a summary in JSON per recording.
+/// Returns the rows of a summary in JSON, one per recording.
 fn summary(bench: &Bench) -> Vec<serde_json::Value> {
     serde_json::from_str(&bench.read("out/summary.json")).unwrap()
 }
@@ -59,7 +59,7 @@ fn bad_recordings_leave_the_others_alone() {
     assert_eq!(left.count(), 0, "drafts go");
 }
 
-/// Recordings that are done at the same time keep their warnings apart, and the command's words.
+/// Recordings that are processed at the same time keep their own warnings, in the command's words.
 #[test]
 fn warnings_are_their_own_recordings() {
     let bench = folder();
@@ -76,7 +76,7 @@ fn warnings_are_their_own_recordings() {
         "{said:?}"
     );
     assert_eq!((warnings(&rows[0]), warnings(&rows[2])), (None, None));
-    // Quiet is said to the command, not to the batch.
+    // `-q` applies to the command, not to the batch.
     bench.run(&[&SMOOTH[..], &["--summary", "json", "--", "-q"]].concat()).ok();
     assert_eq!(summary(&bench).iter().filter_map(warnings).count(), 0);
 }
@@ -91,19 +91,19 @@ fn what_is_done_is_done_once() {
     };
     assert_eq!(states(&smooth), "done done done");
     assert_eq!(states(&smooth), "kept kept kept");
-    // A recording that has changed, an output that somebody has cut, and one that is gone.
+    // A changed recording, a truncated output, and a missing one.
     bench.write("in/b.csv", bench.read("in/a.csv"));
     assert_eq!(states(&smooth), "kept done kept");
     bench.write("out/a.csv", "time_s\n");
     assert_eq!(states(&smooth), "done kept kept");
     fs::remove_file(bench.path("out/day 2/a.csv")).unwrap();
     assert_eq!(states(&smooth), "kept kept done");
-    // Other flags, another sensor, and because somebody says so.
+    // Other flags, another sensor, and repetition on request.
     assert_eq!(states(&[&smooth[..], &["--", "--without", "correction"]].concat()), "done done done");
     bench.write("sensor.toml", bench.read("sensor.toml") + "\n");
     assert_eq!(states(&[&smooth[..], &["--", "--without", "correction"]].concat()), "done done done");
     assert_eq!(states(&[&smooth[..], &["--again", "--", "--without", "correction"]].concat()), "done done done");
-    // A line that a killed run left unfinished.
+    // A line left unfinished by a killed run.
     let journal = bench.read("out/batch.jsonl");
     let lines: Vec<&str> = journal.lines().collect();
     let [.., first, second, third] = lines[..] else { panic!("{journal}") };
@@ -224,7 +224,7 @@ fn recordings_of_one_sensor_are_calibrated_together_and_evaluated() {
     assert!(fs::read(bench.path("scores/summary.parquet")).unwrap().ends_with(b"PAR1"));
 }
 
-/// Numbers of a CSV and of the CSV that is filtered from its Parquet are the same, out and in.
+/// A CSV and the CSV filtered from its Parquet contain the same numbers, as output and as input.
 #[test]
 fn parquet_holds_the_same_numbers() {
     let bench = folder();
@@ -245,7 +245,7 @@ fn parquet_holds_the_same_numbers() {
     let bytes = fs::metadata(bench.path("out/b.parquet")).unwrap().len();
     let text = bench.run(&["filter", "in/b.csv", "--sensor", "sensor.toml"]).ok();
     assert!(bytes < text.len() as u64, "{bytes} of {}", text.len());
-    // Estimates hold time and readings: they are a recording again, and give the same estimates.
+    // Estimates contain time and readings, so that they are a recording again, and give the same estimates.
     for command in ["filter", "smooth"] {
         let again = bench.run(&[command, "out/b.parquet", "--sensor", "sensor.toml"]).ok();
         let first = bench.run(&[command, "in/b.csv", "--sensor", "sensor.toml"]).ok();
@@ -253,7 +253,7 @@ fn parquet_holds_the_same_numbers() {
     }
     let evaluated = |file: &str| bench.run(&["evaluate", file, "--sensor", "sensor.toml"]).ok();
     let lines = |text: String| text.lines().skip(1).map(str::to_owned).collect::<Vec<_>>();
-    // Scored against its own estimates, as a CSV with the same columns is.
+    // Scored against its own estimates, like a CSV with the same columns.
     bench.write("b.csv", text);
     assert_eq!(lines(evaluated("out/b.parquet")), lines(evaluated("b.csv")));
 }

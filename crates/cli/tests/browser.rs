@@ -1,5 +1,5 @@
-//! The report in a browser without a window: no complaint on its console, nothing wider than a phone, values under the
-//! pointer, plots that can be enlarged; and figures that look as they did when a person last looked at them.
+//! The report in a headless browser: no message on its console, nothing wider than a phone, values under the pointer, plots
+//! that can be enlarged; and figures that look as they did when a person last approved them.
 //!
 //! Without Chromium they test nothing, and say so on stderr; with `OHMSTRAIN_REQUIRE_CHROMIUM=1`, as in `.ci/run`, they fail. After a wanted change of a
 //! figure: `OHMSTRAIN_FINGERPRINTS=DIR cargo test -p ohmstrain-cli --test all browser::` writes the pictures to DIR for somebody to
@@ -24,13 +24,13 @@ fn browser() -> Option<PathBuf> {
     if found.is_none() {
         let missing = "the report is not tested: no chromium (scripts/chromium.sh installs it)";
         assert!(env::var_os("OHMSTRAIN_REQUIRE_CHROMIUM").is_none(), "{missing}");
-        // Not by a macro: those are heard of tests that fail only.
+        // Not by a macro: the output of macros is shown for failing tests only.
         let _ = writeln!(io::stderr(), "{missing}");
     }
     found
 }
 
-/// Opens a page; what comes on stdout. A complaint on the console is a failure.
+/// Opens a page, and returns the browser's stdout. A message on the console is a failure.
 fn open(browser: &Path, bench: &Bench, page: &str, arguments: &[&str]) -> String {
     let profile = format!("--user-data-dir={}", bench.path("profile").display());
     let usual = [
@@ -50,10 +50,10 @@ fn open(browser: &Path, bench: &Bench, page: &str, arguments: &[&str]) -> String
     String::from_utf8_lossy(&done.stdout).into_owned()
 }
 
-/// A folder with a report, `report.html`, and its figures, of a recording that nothing is random in.
+/// Returns a folder with a report, `report.html`, and its figures, of a recording without randomness.
 fn reported() -> Bench {
     let bench = Bench::new();
-    // Not calibrated here: what is compared is how things are drawn.
+    // Not calibrated here, since the comparison is of the drawing.
     bench.write("sensor.toml", include_str!("../../ohmstrain/examples/sensor.toml"));
     bench.run(&[&crate::common::SIMULATE[..7], &["-o", "trace.csv"]].concat()).ok();
     let flags = ["evaluate", "trace.csv", "--sensor", "sensor.toml", "--report", "report.html", "--figures", "figures"];
@@ -61,7 +61,7 @@ fn reported() -> Bench {
     bench
 }
 
-/// Moves the pointer over the first plot, drags over its middle, and goes back; what came of it stands in the title.
+/// Moves the pointer over the first plot, drags over its middle, and goes back; the title contains the results.
 const SCRIPT: &str = "<script>addEventListener('load', () => {
   const svg = document.querySelector('.plot > svg'), box = svg.getBoundingClientRect(), data = svg.querySelector('g.data');
   const send = (kind, share, target) => target.dispatchEvent(new PointerEvent(kind, { bubbles: true, pointerType: 'mouse',
@@ -96,13 +96,13 @@ fn the_report_works_on_every_screen() {
         assert_eq!(found["dark"], background);
         let pixels = |name: &str| found[name].as_f64().unwrap();
         assert!(pixels("wide") <= pixels("window"), "{found}");
-        // The recording is 400 s long; its middle is where the pointer is, but for the axis' labels at the left.
+        // The recording is 400 s long; the pointer is at its middle, apart from the axis labels on the left.
         let value = found["value"].as_str().unwrap();
         let time_s: f64 = value.split(" | ").next().unwrap().parse().unwrap();
         assert!((150.0..250.0).contains(&time_s), "{found}");
         assert!(found["zoomed"].as_str().unwrap().contains("scale(") && found["ticks"] == 10, "{found}");
         assert_eq!(found["back"], "", "{found}");
-        // Where a plot is wider than the screen, it says so.
+        // A plot that is wider than the screen shows a hint.
         assert_eq!(found["hint"].as_str().unwrap().contains("slide"), found["cut"] == true, "{found}");
         assert_eq!(found["cut"], size.contains("500"), "{found}");
     }
@@ -133,7 +133,7 @@ fn the_report_prints_on_few_pages() {
     assert!((3..=5).contains(&pages), "{pages}");
 }
 
-/// The figures that were looked at.
+/// The approved figures.
 const LOOKED_AT: [&str; 9] = [
     "strain-against-time",
     "error-against-time",
@@ -147,13 +147,13 @@ const LOOKED_AT: [&str; 9] = [
 ];
 /// Cells of a fingerprint across and down.
 const CELLS: (usize, usize) = (24, 12);
-/// Largest difference of a cell's mean brightness, 0 to 255, from the approved one: other fonts move letters within a
-/// cell, another compiler or processor a line by less than a pixel. A line that is missing, or an axis that is another one,
-/// changes dozens of cells by more; a picture that is another one most of them.
+/// Largest difference of a cell's mean brightness, 0 to 255, from the approved one. Other fonts move letters within a cell;
+/// another compiler or processor moves a line by less than a pixel. A missing line or a different axis changes dozens of cells
+/// by more, and a different picture most of them.
 const CELL_TOLERANCE: f64 = 12.0;
 const CELLS_BEYOND: usize = 6;
 
-/// Mean brightness of cells.
+/// Returns the mean brightness of the cells.
 fn fingerprint(png: &[u8]) -> Vec<f64> {
     let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
     let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
@@ -200,7 +200,7 @@ fn figures_look_as_they_did_when_somebody_looked() {
     }
 }
 
-/// A fingerprint notices what a person would.
+/// A fingerprint detects differences that a person would notice.
 #[test]
 fn a_fingerprint_tells_figures_apart() {
     let kept = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fingerprints");

@@ -2,7 +2,7 @@
 
 use crate::common::{Bench, Run, SIMULATE, change_rows};
 
-/// Rows before this one calibrate, the others test.
+/// Number of rows for calibration; the others are for the test.
 const HALF: usize = 1000;
 const UNTIL: &str = "200";
 const EKF: [&str; 2] = ["--estimator", "ekf"];
@@ -24,14 +24,14 @@ fn calibrate_until(bench: &Bench, trace: &str, until: &str, more: &[&str]) -> Ru
     bench.run(&[&["calibrate", trace, "--until", until, "-o", "sensor.toml"], &EKF[..], more].concat())
 }
 
-/// Error on the second half of `trace.csv`, %FS.
+/// Returns the error on the second half of `trace.csv`, %FS.
 fn error_on_the_rest(bench: &Bench) -> f64 {
     let scores = bench.run(&["evaluate", "trace.csv", "--sensor", "sensor.toml", "--from", UNTIL, "--json"]).ok();
     let scores: serde_json::Value = serde_json::from_str(&scores).unwrap();
     scores["recordings"][0]["rmse_percent_fs"].as_f64().unwrap()
 }
 
-/// The recording with one cell of one row changed.
+/// Returns the recording with one cell of one row changed.
 fn spiked(bench: &Bench, row: usize, column: usize, factor: f64) -> String {
     change_rows(&bench.read("trace.csv"), |k, cells| {
         if k == row {
@@ -64,13 +64,13 @@ fn one_bad_row_is_named_and_changes_nothing() {
         assert!(run.stdout.lines().next().unwrap().starts_with(&named), "{}", run.stdout);
         let warning = run.warnings.first().unwrap();
         assert!(run.warnings.len() == 1 && warning.contains(&named) && warning.contains(what), "{:?}", run.warnings);
-        // Numbers as they were recorded, without zeros behind them.
+        // Numbers as they were recorded, without trailing zeros.
         assert!(!warning.contains("000 "), "{warning}");
         let error = error_on_the_rest(&bench);
         bench.write("missing.csv", spiked(&bench, row, column, f64::NAN));
         calibrate(&bench, "missing.csv", &[]).ok();
         assert_eq!(error, error_on_the_rest(&bench), "{what}: as if it were missing");
-        // One row less of a thousand leads the search elsewhere, by as much as two searches differ.
+        // One row less in a thousand changes the result of the search by as much as two searches differ.
         assert!((error / clean - 1.0).abs() < 0.06, "{what}: {error} %FS instead of {clean}");
     }
 }
@@ -88,7 +88,7 @@ fn a_contact_that_fails_for_two_seconds_is_left_out() {
     bench.write("failing.csv", failing);
     let run = calibrate(&bench, "failing.csv", &[]);
     assert_eq!(run.code, Some(0), "{}", run.stderr);
-    // Five rows by name, and that there are more.
+    // Five rows by name, and the number of the others.
     assert!(run.warnings.len() == 6 && run.warnings[0].contains("data row 501 ("), "{:?}", run.warnings);
     assert!(run.warnings[5].contains("5 more rows"), "{:?}", run.warnings);
     let error = error_on_the_rest(&bench);
@@ -119,7 +119,7 @@ fn readings_that_have_nothing_to_do_with_the_reference_are_refused() {
     }
 }
 
-/// Seconds of the published protocol until it begins again.
+/// Period of the published protocol, s.
 const ONCE: &str = "171";
 
 /// The published protocol with the published material: twice an extension, a hold and a release.
@@ -128,8 +128,8 @@ fn simulate_extend_hold(bench: &Bench, name: &str) {
     bench.run(&[&["simulate", "-o", name][..], &of].concat()).ok();
 }
 
-/// Of one extension, one hold and one release no part is like another: parts left out tell nothing, and the rows that the law is fitted to
-/// tell that readings and reference belong together.
+/// A recording of one extension, one hold and one release has no two similar parts. Held-out parts are then uninformative, and
+/// the fitted rows show that readings and reference belong together.
 #[test]
 fn one_extension_one_hold_and_one_release_calibrate() {
     let bench = bench();
@@ -138,7 +138,7 @@ fn one_extension_one_hold_and_one_release_calibrate() {
     assert!(bench.files().contains(&"sensor.toml".to_owned()));
 }
 
-/// The recording with a column times a factor and a metadata line.
+/// Returns the recording with a column times a factor, and a metadata line.
 fn in_unit(bench: &Bench, column: usize, factor: f64, line: &str) -> String {
     let changed = change_rows(&bench.read("trace.csv"), |_, cells| {
         cells[column] = (cells[column].parse::<f64>().unwrap() * factor).to_string();
@@ -161,7 +161,7 @@ fn another_unit_is_asked_about_and_converted() {
         assert_eq!(asked.code, Some(4), "{}", asked.stderr);
         assert!(asked.stderr.contains(&format!("--unit {unit}")), "{}", asked.stderr);
         assert!(asked.stderr.contains(line.trim_end()), "{}", asked.stderr);
-        // A thousand roundings in the last place lead the search to within its own resolution.
+        // A thousand rounding errors change the result of the search by no more than its own resolution.
         let same = |bench: &Bench| (error_on_the_rest(bench) / plain - 1.0).abs() < 1e-3;
         calibrate(&bench, "other.csv", &["--unit", unit]).ok();
         assert!(same(&bench), "{unit}");
@@ -171,12 +171,12 @@ fn another_unit_is_asked_about_and_converted() {
     }
 }
 
-/// Readings and reference under each other's name.
+/// Readings and reference under each other's name are reported.
 #[test]
 fn exchanged_columns_are_told() {
     let bench = bench();
     let exchanged = change_rows(&bench.read("trace.csv"), |_, cells| {
-        // A strain of none would be no resistance, and is refused as such.
+        // Zero strain would not be a valid resistance, and is refused as such.
         let strain = cells[2].parse::<f64>().unwrap().max(1e-3);
         (cells[1], cells[2]) = (strain.to_string(), cells[1].clone());
     });
@@ -189,7 +189,7 @@ fn exchanged_columns_are_told() {
 #[test]
 fn two_units_in_one_calibration_are_refused() {
     let bench = bench();
-    // Small strains in percent look like fractions by themselves.
+    // Small strains in percent look like fractions.
     let small = |factor: f64| {
         change_rows(&bench.read("trace.csv"), |_, cells| {
             cells[2] = (cells[2].parse::<f64>().unwrap() * factor).to_string();
@@ -242,7 +242,7 @@ fn a_late_reference_is_refused_or_moved() {
     // One row.
     assert!((seconds(&run.stderr, "seems to be ") - 2.0).abs() < 0.2, "{}", run.stderr);
     assert!(run.stderr.contains("late.csv: ") && run.stderr.contains(" s late"), "{}", run.stderr);
-    // The one estimate, wherever it is said; of several recordings the late one is named.
+    // The same estimate everywhere; among several recordings the late one is named.
     let both = bench.run(&[&["calibrate", "trace.csv", "late.csv", "-o", "both.toml"], &EKF[..]].concat());
     assert!(both.code == Some(4) && both.stderr.contains("late.csv: expected a reference"), "{}", both.stderr);
     let inspected = bench.run(&["inspect", "late.csv", "--json"]).ok();
@@ -252,13 +252,14 @@ fn a_late_reference_is_refused_or_moved() {
     let run = calibrate(&bench, "late.csv", &["--align"]);
     assert_eq!(run.code, Some(0), "{}", run.stderr);
     assert!((seconds(&run.warnings[0], "the reference is ") - 2.0).abs() < 0.2, "{:?}", run.warnings);
-    // Aligned to a fraction of a row, it is no worse than before to the extent that two searches are alike.
+    // Aligned to a fraction of a row, it is no worse than before, within the difference of two searches.
     let moved = error_on_the_rest(&bench);
     assert!(moved < 1.1 * plain, "{moved} %FS instead of {plain}");
 }
 
-/// A few movements of 5 s to and fro. A reference that is 0.6 s early is so by more than a tenth of a movement, and by less than three
-/// times the 0.25 s that the sensor may lag itself: it is warned of. One that is 1.5 s early is refused, one on time is not spoken of.
+/// A few movements of 5 s to and fro. A reference that is 0.6 s early exceeds a tenth of a movement, but not three times the
+/// 0.25 s that the sensor itself may lag: it causes a warning. One that is 1.5 s early is refused; one on time causes no
+/// message.
 #[test]
 fn a_reference_that_may_be_early_is_warned_of() {
     let bench = Bench::new();
@@ -289,7 +290,7 @@ fn a_reference_that_may_be_early_is_warned_of() {
     assert!(moved.len() == 1 && moved[0].contains("early; it was moved by that"), "{moved:?}");
 }
 
-/// Two rows, 0.4 s, where a movement takes 7: too little to refuse, and said where everything is.
+/// A lag of two rows, 0.4 s, against movements of 7 s: too little for a refusal; it is reported with all other findings.
 #[test]
 fn a_reference_that_is_a_little_late_is_told_of() {
     let bench = Bench::new();

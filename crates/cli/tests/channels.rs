@@ -1,18 +1,18 @@
-//! One recording of several channels: calibrated, fused, evaluated and run in one command each.
+//! A recording of several channels: calibrated, fused, evaluated and filtered in one command each.
 
 use crate::common::{Bench, Csv, change_rows};
 
 /// Names of the channels.
 const CHANNELS: [&str; 3] = ["inner", "middle", "outer"];
-/// End of what is calibrated on, s.
+/// End of the rows for calibration, s.
 const UNTIL: &str = "100";
 
-/// A number in ±1 that looks like chance.
+/// Returns a pseudo-random number in ±1.
 fn noise(row: usize, channel: usize) -> f64 {
     ((row * 3 + channel) as f64 * 12.9898).sin() * 43758.5453 % 1.0
 }
 
-/// A recording of 150 s: three channels with curves of their own see one strain, two of them its rate as well.
+/// Returns a recording of 150 s: three channels with curves of their own measure one strain, two of them its rate as well.
 fn knee() -> String {
     let names: Vec<String> = CHANNELS.iter().map(|channel| format!("{channel}_ohm")).collect();
     let mut text = format!("# sleeve = 7\ntime_s,{},strain\n", names.join(","));
@@ -22,7 +22,7 @@ fn knee() -> String {
         let t = 0.1 * row as f64;
         let (e, rate) = (strain(t), (strain(t) - strain(t - 0.1)) / 0.1);
         let ln_r = [2.0 * e + 0.3 * rate, 3.0 * e - 2.0 * e * e, 1.5 * e + 3.0 * e * e - 0.2 * rate];
-        // Errors of readings are alike over five seconds.
+        // Errors of readings are correlated over five seconds.
         for (channel, drift) in drift.iter_mut().enumerate() {
             *drift = 0.98 * *drift + 0.2 * noise(row, channel + 7);
         }
@@ -33,7 +33,7 @@ fn knee() -> String {
     text
 }
 
-/// A folder with that recording and a quick calibration on its first 100 s, made once.
+/// Returns a folder with that recording and a quick calibration on its first 100 s, made once.
 fn bench() -> Bench {
     static FILES: std::sync::OnceLock<Vec<(String, String)>> = std::sync::OnceLock::new();
     let files = FILES.get_or_init(|| {
@@ -48,7 +48,7 @@ fn bench() -> Bench {
     bench
 }
 
-/// Errors, % of full scale, and shares within the 95 % interval: of the joint, and of its best channel.
+/// Returns errors, % of full scale, of the joint and of its best channel, and the joint's coverage of the 95 % interval.
 fn scores(json: &str) -> ([f64; 2], f64) {
     let json: serde_json::Value = serde_json::from_str(json).unwrap();
     let joint = &json["joints"][0];
@@ -66,7 +66,7 @@ fn channels_of_one_strain_are_fused() {
     assert!(fused < best && covered > 0.9, "{fused} {best} {covered}");
     let scored = bench.run(&["evaluate", "knee.csv", "--sensor", "knee.toml", "--from", UNTIL, "--json"]).ok();
     let ([fused, covered], best) = scores(&scored);
-    // Three errors alike of which half of the variance were common to all would leave 0.82 of one.
+    // Three equal errors with half of the variance in common would leave 0.82 of one.
     assert!(fused < 0.82 * best && covered > 0.9, "{fused} {best} {covered}");
     let table = bench.run(&["evaluate", "knee.csv", "--sensor", "knee.toml", "--from", UNTIL]).ok();
     assert!(table.contains("| knee ") && table.contains("inner_ohm alone"), "{table}");
@@ -74,14 +74,14 @@ fn channels_of_one_strain_are_fused() {
     let angles = Csv::new(&bench.run(&["hand", "knee.toml", "knee.csv"]).ok());
     assert_eq!(angles.header, "time_s,knee_strain,knee_strain_sd,flags");
     assert_eq!(angles.len(), Csv::new(&bench.read("knee.csv")).len());
-    // The same again gives the same files, and replaces them without a word.
+    // Another run gives the same files, and replaces them silently.
     let before: Vec<String> = ["knee.toml", "knee-fusion.toml", "knee-outer.toml"].map(|name| bench.read(name)).into();
     bench.run(&["calibrate", "knee.csv", "--until", UNTIL, "-o", "knee.toml", "--estimator", "ekf", "--quiet"]).ok();
     let after: Vec<String> = ["knee.toml", "knee-fusion.toml", "knee-outer.toml"].map(|name| bench.read(name)).into();
     assert_eq!(before, after);
 }
 
-/// A channel that is unplugged, or shorted, from 110 s on.
+/// A channel that is unplugged or shorted from 110 s on leaves the others working.
 #[test]
 fn a_channel_that_fails_leaves_the_others() {
     let bench = bench();
@@ -142,7 +142,7 @@ fn what_is_wrong_with_several_channels_is_said() {
     assert!(!std::path::Path::new(&bench.path("out.toml")).exists());
 }
 
-/// Two joints with a reference each: two sensors, none fused.
+/// Two joints, each with its own reference: two sensors without fusion.
 #[test]
 fn each_reference_is_a_joint() {
     let bench = bench();

@@ -41,7 +41,7 @@ fn a_calibration_ends_in_ten_lines() {
     }
 }
 
-/// The error on quarters left out is near the one on rows that the calibration never had.
+/// The error on held-out quarters is near that on rows that the calibration never had.
 #[test]
 fn json_says_what_the_error_elsewhere_is() {
     let bench = Bench::calibrated_by_default();
@@ -57,12 +57,12 @@ fn json_says_what_the_error_elsewhere_is() {
     let unseen = number(&unseen["recordings"][0]["rmse"]);
     let cubic = number(&left_out["static_cubic"]["rmse"]);
     assert!(smoother < filter && filter < cubic, "{smoother} {filter} {cubic}");
-    // A hundred seconds with some ten movements scatter: a factor of two to either side.
+    // A hundred seconds with some ten movements vary by a factor of two to either side.
     assert!((0.5..2.0).contains(&(filter / unseen)), "{filter} {unseen}");
     assert_eq!(left_out["seen"]["tenths"].as_array().unwrap().len(), 10);
     let rows: f64 = left_out["seen"]["tenths"].as_array().unwrap().iter().map(number).sum();
     assert!((rows - 1.0).abs() < 1e-9);
-    // What limits the error is the largest of the shares beside it.
+    // The named limit is the one with the largest share.
     let shares = closing["error_shares"].as_object().unwrap();
     let largest = shares.iter().max_by(|a, b| number(a.1).total_cmp(&number(b.1))).unwrap().0;
     assert_eq!(closing["limited_by"].as_str(), Some(largest.as_str()));

@@ -25,7 +25,7 @@ fn filter_never_reads_the_reference() {
     assert_eq!(bench.feed(&["filter", "--sensor", "sensor.toml"], blind).ok(), with);
 }
 
-/// A factor on a standard deviation, as the sensor file has it.
+/// Returns a factor on a standard deviation from the sensor file.
 fn sd_scale(bench: &Bench, field: &str) -> f64 {
     let sensor = bench.read("sensor.toml");
     let line = sensor.lines().find(|line| line.starts_with(field)).unwrap();
@@ -35,7 +35,7 @@ fn sd_scale(bench: &Bench, field: &str) -> f64 {
 #[test]
 fn smoother_and_filter_share_header_and_last_row_and_nothing_in_between() {
     let bench = Bench::calibrated();
-    // R₀ that follows the readings does so at their end only in the filter.
+    // An R₀ that adapts to the readings has adapted by their end only in the filter.
     let told = ["--sensor", "sensor.toml", "--without", "doubts", "--rest-resistance", "calibrated"];
     let estimates = |command| Csv::new(&bench.run(&[&[command, "trace.csv"][..], &told].concat()).ok());
     let (filtered, smoothed) = (estimates("filter"), estimates("smooth"));
@@ -45,7 +45,7 @@ fn smoother_and_filter_share_header_and_last_row_and_nothing_in_between() {
     for column in ["strain", "strain_rate", "relaxation", "flags"] {
         assert_eq!(smoothed.cells(column).last(), filtered.cells(column).last(), "{column}");
     }
-    // Standard deviations of strain carry a calibrated factor each; without it the last ones are equal.
+    // Each standard deviation of strain contains a calibrated factor; without it the last ones are equal.
     let unscaled = |csv: &Csv, scale: &str| {
         let scale = sd_scale(&bench, scale);
         csv.numbers("strain_sd").iter().map(|sd| sd / scale).collect::<Vec<f64>>()
@@ -53,7 +53,8 @@ fn smoother_and_filter_share_header_and_last_row_and_nothing_in_between() {
     let (filtered, smoothed) = (unscaled(&filtered, "strain_sd_scale"), unscaled(&smoothed, "smoothed_sd_scale"));
     let (last_filtered, last_smoothed) = (filtered[filtered.len() - 1], smoothed[smoothed.len() - 1]);
     assert!((last_smoothed / last_filtered - 1.0).abs() < 1e-12);
-    // All readings say more than those so far; a linearisation may break this in single rows, not on the whole.
+    // All readings are more informative than those up to a row. A linearisation may violate this in single rows, but not on the
+    // whole.
     assert!(smoothed.iter().sum::<f64>() < filtered.iter().sum::<f64>());
 }
 
@@ -71,7 +72,7 @@ fn columns_are_chosen_and_ordered_by_name() {
     }
 }
 
-/// `trace.csv` with other columns, calibrated and filtered.
+/// Returns `trace.csv` with other columns, calibrated and filtered.
 fn estimates_of(bench: &Bench, trace: &str) -> Csv {
     estimates_by("auto", bench, trace)
 }
@@ -136,9 +137,9 @@ fn a_joint_appends_its_angle() {
     const JOINT: &str = "prestrain=0.02 moment_arm_mm=6 gauge_length_mm=30";
     let bench = Bench::calibrated();
     let with_joint = format!("# joint = {JOINT}\n{}", bench.read("trace.csv"));
-    // Known to the sensor since its calibration.
+    // The sensor has it from its calibration.
     assert_angles(&estimates_of(&bench, &with_joint), 0.02, 0.2);
-    // Told by the recording, or by a flag of `filter` and of `import`, which overrides it.
+    // From the recording, or from a flag of `filter` and of `import`, which overrides it.
     let flag = ["--joint", "prestrain=0 moment_arm_mm=-3 gauge_length_mm=30"];
     bench.run(&[&["-q", "import", "other.csv", "-o", "imported.csv"], &flag[..]].concat()).ok();
     for (command, recording, told) in [("filter", "other.csv", &flag[..]), ("smooth", "imported.csv", &[])] {
@@ -182,7 +183,7 @@ fn converter_codes_become_ohms_and_saturated_ones_are_flagged() {
     for row in 7..10 {
         assert_eq!((estimates.cells("resistance_ohm")[row], estimates.cells("nis")[row]), ("", ""));
     }
-    // Code c of 4095 says R = 4000 c / (4095 - c), to half a code or so.
+    // Code c of 4095 is R = 4000 c / (4095 - c), to about half a code.
     let code: f64 = Csv::new(&trace).numbers("adc")[100];
     let ohm: f64 = estimates.cells("resistance_ohm")[100].parse().unwrap();
     assert!((ohm / (4000.0 * code / (4095.0 - code)) - 1.0).abs() < 2e-3, "{ohm} for code {code}");
@@ -190,7 +191,7 @@ fn converter_codes_become_ohms_and_saturated_ones_are_flagged() {
     let [filtered, smoothed] =
         ["filter", "smooth"].map(|command| bench.run(&[&[command, "other.csv"], &sensor[..]].concat()).ok());
     assert_eq!(Csv::new(&smoothed).cells("flags")[7].split('|').next(), Some("saturated"));
-    // A recording that does not know its electronics is told once, by `import`; `filter` takes them from a flag, too.
+    // `import` states the electronics of a recording once and for all; `filter` takes them from a flag, too.
     let rows: Vec<&str> = trace.lines().filter(|line| !line.starts_with("# front_end")).collect();
     bench.write("bare.csv", rows.join("\n") + "\n");
     let refused = bench.run(&[&["smooth", "bare.csv"], &sensor[..]].concat());
@@ -211,8 +212,8 @@ fn a_known_initial_strain_starts_there() {
             (estimates.numbers("strain")[0], estimates.numbers("strain_sd")[0] / scale)
         };
         let ((_, unknown_sd), (zero, zero_sd)) = (first(&[]), first(&["--initial-strain", "0"]));
-        // It is believed to a thousandth of the range, 3.3e-4, before the first reading says something and before the
-        // calibrated factor.
+        // Its deviation is a thousandth of the range, 3.3e-4, before the first reading takes effect and before the calibrated
+        // factor.
         assert!(
             zero.abs() < 2e-3 && zero_sd <= 3.34e-4 && unknown_sd > 10.0 * zero_sd,
             "{zero} {zero_sd} {unknown_sd}"
@@ -222,8 +223,8 @@ fn a_known_initial_strain_starts_there() {
     assert!((Csv::new(&far).numbers("strain")[0] - 0.2).abs() < 2e-3);
 }
 
-/// A strain that is known where the filter errs most improves that row and the second after it, also with a lag, where the
-/// rows before it profit too; and rows before it, without a lag, are as they were.
+/// A strain known at the filter's largest error improves that row and the second after it, also with a lag, with which the rows
+/// before it profit, too. Without a lag, rows before it do not change.
 #[test]
 fn a_strain_that_is_known_is_taken_in() {
     let bench = Bench::calibrated();
@@ -237,14 +238,14 @@ fn a_strain_that_is_known_is_taken_in() {
         };
         let (untold, estimates) = errors(&[]);
         let worst = (50..untold.len() - 10).max_by(|a, b| untold[*a].total_cmp(&untold[*b])).unwrap();
-        // A time between the rows: it is the next row's strain that is known.
+        // At a time between two rows, the strain applies to the next row.
         let time_s = estimates.numbers("time_s")[worst] - 0.01;
         let known = format!("{time_s}:{}:0.001", truth[worst]);
         let (told, estimates) = errors(&["--known", &known]);
         let mean = |errors: &[f64]| errors.iter().sum::<f64>() / errors.len() as f64;
         let smoothed = if lag.is_empty() { 0.0 } else { sd_scale(&bench, "smoothed_sd_scale") };
         let sd = estimates.numbers("strain_sd")[worst] / sd_scale(&bench, "strain_sd_scale").max(smoothed);
-        // Four deviations of what is known.
+        // Four deviations of the known strain.
         assert!(told[worst] < 0.004 && sd < 1.001e-3, "{lag:?}: {} ± {sd}, was {}", told[worst], untold[worst]);
         assert!(mean(&told[worst..worst + 5]) < 0.7 * mean(&untold[worst..worst + 5]), "{lag:?}: {told:?}");
         if lag.is_empty() {
@@ -253,7 +254,7 @@ fn a_strain_that_is_known_is_taken_in() {
             assert!(told[worst - 1] < untold[worst - 1]);
         }
     }
-    // After the end it is of no use, which is said.
+    // After the end of the recording it is not used, and a message says so.
     for lag in [&["--lag-s", "1"][..], &[]] {
         let late =
             bench.run(&[&["filter", "trace.csv", "--sensor", "sensor.toml", "--known", "5000:0.1"], lag].concat());
@@ -266,7 +267,7 @@ fn a_strain_that_is_known_is_taken_in() {
     }
 }
 
-/// The smoother hears of it before and after, and says what is of no use.
+/// The smoother uses it for rows before and after, and reports unused ones.
 #[test]
 fn a_smoother_takes_in_a_strain_that_is_known() {
     let bench = Bench::calibrated();
@@ -282,8 +283,8 @@ fn a_smoother_takes_in_a_strain_that_is_known() {
     assert!(warnings.iter().any(|warning| warning.contains("--known 5000:0.1 was not used")), "{warnings:?}");
 }
 
-/// A stretch, and a rest that is a fifth of the readings' range above the calibration's: what is asked ends in the flag that answers
-/// it, which is taken.
+/// A stretch, and a rest that lies a fifth of the readings' range above the calibration's. The question ends with the flag that
+/// answers it, which is accepted.
 #[test]
 fn a_long_quiet_hold_is_asked_about() {
     let bench = Bench::calibrated();
@@ -308,7 +309,7 @@ fn a_long_quiet_hold_is_asked_about() {
     let flags: Vec<&str> = answer.split_whitespace().take(2).collect();
     let (questions, answered) = asked(&flags);
     assert!(questions.is_empty(), "{questions:?}");
-    // From the row on that it names, thirty seconds after the stretch.
+    // From the named row on, thirty seconds after the stretch.
     let first = answered.iter().zip(&unanswered).position(|(answered, unanswered)| answered != unanswered).unwrap();
     assert!((245..255).contains(&first), "{first}");
     assert!(answered[first] < 0.005 && answered[275] < 0.6 * unanswered[275], "{} {}", answered[275], unanswered[275]);
@@ -342,7 +343,7 @@ fn the_rest_resistance_is_the_sensors_or_given_or_that_of_the_first_readings() {
         assert_ne!(estimates("first:5"), as_then);
         assert_ne!(estimates("1234"), as_then);
     }
-    // The scale of the readings and of R₀ is the same thing twice.
+    // A common factor of the readings and of R₀ cancels.
     let scaled = change_rows(&trace, |_, cells| {
         if let Ok(ohm) = cells[1].parse::<f64>() {
             cells[1] = (ohm * 2.0).to_string();

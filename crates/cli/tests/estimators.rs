@@ -1,9 +1,9 @@
-//! Every estimator from the command line: calibrated, stored as the default, run, scored.
+//! Every estimator from the command line: calibrated, stored as the default, run and scored.
 
 use crate::common::{Bench, Csv, SIMULATE};
 use serde_json::Value;
 
-/// A minute of calibration is little to learn from, and enough to see that everything is wired.
+/// A minute of calibration is little to learn from, but enough to see that everything is connected.
 const CALIBRATED_UNTIL: &str = "60";
 
 fn calibrated_for(estimator: &str) -> Bench {
@@ -14,12 +14,12 @@ fn calibrated_for(estimator: &str) -> Bench {
     bench
 }
 
-/// Filters with the sensor file's choice and with the estimator by name: the same. Phases are known, and sum to one, if
-/// and only if the estimator has them.
+/// Filters with the sensor file's default and with the estimator by name, which must agree. Phases are known, and sum to one,
+/// if and only if the estimator has them.
 fn check(estimator: &str, has_phases: bool) {
     let bench = calibrated_for(estimator);
-    // R₀ that follows the readings does so at their end only in the filter, and only the filter looks again after a reading that it
-    // takes with less weight.
+    // An R₀ that adapts to the readings has adapted by their end only in the filter, and only the filter takes a second look
+    // after a downweighted reading.
     let calibrated = ["--sensor", "sensor.toml", "--rest-resistance", "calibrated", "--influence", "none"];
     let filter = [&["filter", "trace.csv"][..], &calibrated].concat();
     let printed = bench.run(&filter).ok();
@@ -40,7 +40,7 @@ fn check(estimator: &str, has_phases: bool) {
     assert_eq!(scores["estimator"], estimator);
     assert!(scores["rmse_percent_fs"].as_f64().unwrap() < 100.0);
     let smoothed = Csv::new(&bench.run(&[&["smooth", "trace.csv"][..], &calibrated].concat()).ok());
-    // At the last row smoother and filter know the same; they differ in the calibrated factor of the deviation only.
+    // At the last row smoother and filter use the same readings; they differ only in the calibrated factor of the deviation.
     let last = |estimates: &Csv| *estimates.numbers("strain").last().unwrap();
     assert!((last(&smoothed) - last(&estimates)).abs() < 1e-9);
     let lagged = bench.run(&[&filter[..], &["--lag-s", "0.5"]].concat()).ok();
@@ -48,7 +48,8 @@ fn check(estimator: &str, has_phases: bool) {
     bench.run(&["filter", "trace.csv", "--sensor", "sensor.toml", "--estimator", "ekf"]).ok();
 }
 
-/// Every row is there, in order, and at the end the lagged estimates are the smoother's: both have seen everything.
+/// Checks that every row is there, in order, and that at the end the lagged estimates equal the smoother's: both have used all
+/// readings.
 fn check_lag(lagged: &Csv, filtered: &Csv, smoothed: &Csv) {
     assert_eq!(lagged.cells("time_s"), filtered.cells("time_s"));
     let (lagged, filtered, smoothed) =

@@ -1,4 +1,4 @@
-//! `evaluate` that calibrates by itself: on the first rows of a recording, or on other recordings.
+//! `evaluate` with its own calibration: on the first rows of a recording, or on other recordings.
 
 use crate::common::{Bench, CALIBRATED_UNTIL, Csv, SIMULATE, change_rows};
 use serde_json::Value;
@@ -27,7 +27,7 @@ fn number(value: &Value, name: &str) -> f64 {
     value[name].as_f64().unwrap_or_else(|| panic!("{name} in {value}"))
 }
 
-/// The same estimates scored on the same rows, but for what only one of the two ways reports.
+/// Asserts that the same estimates are scored on the same rows, apart from fields that only one of the two ways reports.
 #[track_caller]
 fn assert_same_scores(a: &Value, b: &Value) {
     let scores = ["n", "rmse", "mae", "bias", "coverage_50", "coverage_90", "coverage_95", "log_score", "wrong_branch"];
@@ -46,7 +46,7 @@ fn a_split_is_a_calibration_on_the_first_rows_and_scores_of_the_rest() {
     let (rows, from) = (600, trace.cells("time_s")[600].to_owned());
     assert_eq!(trace.len(), 2001);
     let split = evaluate(&bench, &["--split", "0.3", "--estimator", "ekf", "1.csv"]);
-    // With --until the sensor would state the errors that it was tested with.
+    // With --until the sensor would cover the errors of its test.
     let text = bench.read("1.csv");
     let before = text.lines().position(|line| line.starts_with(|first: char| first.is_ascii_digit())).unwrap();
     bench.write("first.csv", text.lines().take(before + rows).map(|line| format!("{line}\n")).collect::<String>());
@@ -64,7 +64,7 @@ fn a_split_is_a_calibration_on_the_first_rows_and_scores_of_the_rest() {
     assert!(by_hand[0]["calibration_s"].is_null() && by_hand[0].get("lag_s").is_none());
 }
 
-/// Known strains of the reference add two scores, with a smaller error of the smoother; the score without them stays.
+/// Known strains from the reference add two scores, with a smaller error of the smoother; the score without them is unchanged.
 #[test]
 fn known_strains_are_scored_beside() {
     let bench = simulated(&["1"]);
@@ -79,8 +79,9 @@ fn known_strains_are_scored_beside() {
     assert!(table.contains("ekf, known every 5 s") && table.contains("known: the reference told"), "{table}");
 }
 
-/// Holds of five minutes, of a sensor outside the family of laws and of one within. Before settling started from the reading
-/// the error was 13 and 6 times that of the reading itself, and the interval held 31 % of the last readings of the second.
+/// Holds of five minutes, of a sensor outside the family of laws and of one within. Before the prediction started from the
+/// reading, the error was 13 and 6 times that of the reading itself, and the interval contained 31 % of the last readings of
+/// the second.
 #[test]
 fn settled_readings_are_compared_with_the_ends_of_holds() {
     let bench = Bench::new();
@@ -100,7 +101,7 @@ fn settled_readings_are_compared_with_the_ends_of_holds() {
     assert!(table.contains("settled resistance against the last reading of a hold"), "{table}");
 }
 
-/// Two shares and the halves exchanged: the same as each by itself, and what is summed up comes of the cases.
+/// Two shares, and the halves exchanged: the same as each on its own, and the summary follows from the cases.
 #[test]
 fn several_splits_are_summed_up() {
     let bench = simulated(&["1"]);
@@ -129,7 +130,7 @@ fn several_splits_are_summed_up() {
     assert!((number(&filter, "ratio") - ratios.iter().product::<f64>().cbrt()).abs() < 1e-12);
     let percent: f64 = cases.iter().map(|case| number(case, "rmse_percent_fs")).product();
     assert!((number(&filter, "percent_fs") - percent.cbrt()).abs() < 1e-12);
-    // A number read back from JSON may be off by its last bit.
+    // A number read back from JSON may differ in its last bit.
     let worst = ratios.iter().copied().fold(0.0, f64::max);
     assert!((number(&filter, "worst_ratio") - worst).abs() < 1e-12);
     for name in ["crps_percent_fs", "width_95_percent_fs", "coverage_50", "coverage_90", "coverage_95"] {
@@ -151,7 +152,7 @@ fn nothing_but_the_scores_depends_on_the_reference_of_the_test_rows() {
     });
     bench.write("moved.csv", moved);
     let scores = evaluate(&bench, &["--split", "0.5", "--estimator", "ekf", "1.csv", "moved.csv"]);
-    // The mean of 1001 differences of rounded numbers of order 0.1.
+    // Mean of 1001 differences of rounded numbers of order 0.1.
     let shifted = |plain: &Value, moved: &Value| {
         assert!((number(plain, "bias") - shift - number(moved, "bias")).abs() < 1e-12, "{plain} {moved}");
     };
@@ -176,13 +177,13 @@ fn some_recordings_train_and_others_test() {
         assert_eq!(tested["baselines"].as_object().unwrap().len(), BASELINES.len());
         assert!(number(tested, "calibration_s") > 0.0 && tested.get("lag_s").is_none());
     }
-    // Scoring from a time on is scoring of fewer rows, not another run.
+    // Scoring from a time on means fewer rows, not another run.
     let later = evaluate(&bench, &[&train[..], &["--test", "3.csv", "--from", "200"]].concat());
     let by_hand = evaluate(&bench, &["3.csv", "--sensor", "sensor.toml", "--from", "200"]);
     assert_same_scores(&later[0], &by_hand[0]);
 }
 
-/// Each recording is scored as with the two others given to --train; of one there are no others.
+/// Each recording is scored as with the two others in --train; a single recording has no others.
 #[test]
 fn each_recording_is_left_out_in_turn() {
     let bench = simulated(&["1", "2", "3"]);
@@ -208,7 +209,7 @@ fn the_table_has_filter_smoother_and_all_baselines_per_recording() {
         .filter(|table: &Vec<Vec<String>>| !table.is_empty())
         .collect();
     let names = ["ekf", "smoother", "static cubic", "20 s FIR", "low-pass mode", "leaky bank", "published law"];
-    // A table per recording, then that of all cases.
+    // A table per recording, then one of all cases.
     assert_eq!(tables.len(), 3, "{printed}");
     for table in &tables[..2] {
         for column in ["RMSE", "MAE", "%FS", "bias", "50/90/95 %", "width", "CRPS", "log", "wrong"] {
@@ -245,7 +246,7 @@ fn what_was_scored_before_an_error_is_printed() {
 #[test]
 fn check_holds_a_split_to_the_same_promise() {
     let bench = simulated(&["1"]);
-    // Strains that the sensor never had, several deviations away from those it had.
+    // Strains that the sensor never had, several deviations from those that it had.
     let other = change_rows(&bench.read("1.csv"), |row, cells| {
         if row >= 1000 {
             cells[2] = (cells[2].parse::<f64>().unwrap() + 1.0).to_string();

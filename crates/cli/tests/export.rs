@@ -1,4 +1,4 @@
-//! Output of `export`, and tests that the C it writes computes the same as the program.
+//! Output of `export`, and tests that its C computes the same as the program.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -7,14 +7,14 @@ use std::sync::OnceLock;
 use crate::common::{Bench, Csv, files_in};
 
 const EXPORT: [&str; 4] = ["export", "--sensor", "sensor.toml", "--dt-s"];
-/// Interval of the recordings of `SIMULATE`.
+/// Interval between the readings of `SIMULATE`, s.
 pub const DT_S: &str = "0.2";
 
 fn export(bench: &Bench, target: &str, folder: &str) -> String {
     bench.run(&[&EXPORT[..], &[DT_S, "--target", target, "-o", folder]].concat()).ok()
 }
 
-/// The compilers of the host. None is no reason to fail, unless `OHMSTRAIN_REQUIRE_C` is set.
+/// Returns the compilers of the host. A missing compiler is not a failure unless `OHMSTRAIN_REQUIRE_C` is set.
 pub fn compilers() -> Vec<&'static str> {
     let works =
         |compiler: &&str| Command::new(compiler).arg("--version").output().is_ok_and(|run| run.status.success());
@@ -26,10 +26,10 @@ pub fn compilers() -> Vec<&'static str> {
     found
 }
 
-/// Flags of the README: strict ones.
+/// Strict flags, as in the README.
 const STRICT: [&str; 8] = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Isrc"];
 
-/// Compiles sources strictly into a program, or into an object file if its name ends so; where it is.
+/// Compiles sources strictly into a program, or into an object file if its name ends so; returns its path.
 #[track_caller]
 pub fn compile(compiler: &str, folder: &Path, sources: &[&str], name: &str) -> PathBuf {
     let last: &[&str] = if name.ends_with(".o") { &["-c", "-o"] } else { &["-lm", "-o"] };
@@ -39,7 +39,7 @@ pub fn compile(compiler: &str, folder: &Path, sources: &[&str], name: &str) -> P
     folder.join(name)
 }
 
-/// Runs a program with this on stdin; what it prints.
+/// Runs a program with this on stdin; returns its output.
 #[track_caller]
 pub fn run_program(program: &Path, stdin: &str, arguments: &[&str]) -> String {
     let run = assert_cmd::Command::new(program).args(arguments).write_stdin(stdin).output().unwrap();
@@ -48,13 +48,13 @@ pub fn run_program(program: &Path, stdin: &str, arguments: &[&str]) -> String {
     printed
 }
 
-/// Compiles sources strictly and runs the program with this on stdin; what it prints.
+/// Compiles sources strictly and runs the program with this on stdin; returns its output.
 #[track_caller]
 pub fn compile_and_run(compiler: &str, folder: &Path, sources: &[&str], stdin: &str) -> String {
     run_program(&compile(compiler, folder, sources, "program.out"), stdin, &[])
 }
 
-/// C that earlier versions have exported is compiled by today's compilers, and passes its self-test.
+/// C exported by earlier versions compiles with today's compilers, and passes its self-test.
 #[test]
 fn exported_c_of_released_versions_passes_its_self_test() {
     let released = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/released"));
@@ -76,7 +76,7 @@ fn exported_c_of_released_versions_passes_its_self_test() {
     }
 }
 
-/// The lists for an AVR give the self-test's bits, and those of a recording that is unplugged for a while.
+/// The lists for an AVR reproduce the bits of the self-test, and of a recording with an unplugged sensor.
 #[test]
 fn lists_of_operations_compute_what_compiled_functions_do() {
     let bench = every_filter();
@@ -100,7 +100,7 @@ fn lists_of_operations_compute_what_compiled_functions_do() {
     }
 }
 
-/// Readings come as often as in calibration unless `--dt-s` is given.
+/// Readings come at the interval of the calibration unless `--dt-s` is given.
 #[test]
 fn the_usual_time_between_readings_is_the_calibrations() {
     let bench = Bench::calibrated();
@@ -111,7 +111,7 @@ fn the_usual_time_between_readings_is_the_calibrations() {
     for file in ["src/ohmstrain.c", "src/ohmstrain.h"] {
         assert_eq!(bench.read(&format!("without/{file}")), bench.read(&format!("with/{file}")), "{file}");
     }
-    // A sensor of a file that names no recording.
+    // The sensor of a file that names no recording.
     let sensor = bench.read("sensor.toml");
     let nameless: Vec<&str> = sensor.split("\n[[recordings]]\n").collect();
     let after = nameless[1].split_once("\n[").map_or("", |(_, after)| after);
@@ -125,7 +125,7 @@ fn the_usual_time_between_readings_is_the_calibrations() {
 fn c_is_an_arduino_library_a_self_test_and_a_readme_and_the_same_every_time() {
     let bench = Bench::calibrated();
     let printed = export(&bench, "c", "once");
-    // What it costs stands in the table, in the row of the exported code, and in the header.
+    // The cost is in the table, in the row of the exported code, and in the header.
     let row = |name: &str| {
         let row = printed.lines().find(|line| line.starts_with(&format!("| {name}")));
         row.unwrap_or_else(|| panic!("{printed}"))
@@ -141,7 +141,7 @@ fn c_is_an_arduino_library_a_self_test_and_a_readme_and_the_same_every_time() {
     );
     let header = bench.read("once/src/ohmstrain.h");
     assert!(printed.lines().filter(|line| line.starts_with('|')).all(|line| header.contains(&format!(" * {line}\n"))));
-    // `calibrate` has tested the rows that were kept from it.
+    // `calibrate` has tested the sensor on the rows kept from it.
     let tested = bench.read("sensor.toml");
     let tested = tested.split("[tested]\nfilter_percent_fs = ").nth(1).unwrap().lines().next().unwrap();
     assert_eq!(row("tested: rows kept from calibration")[0], format!("{:.2}", tested.parse::<f64>().unwrap()));
@@ -173,7 +173,7 @@ fn c_is_an_arduino_library_a_self_test_and_a_readme_and_the_same_every_time() {
 
 const ESTIMATORS: [&str; 4] = ["corrected", "sign-split", "hypotheses", "ekf"];
 
-/// A recording, and a sensor for each filter that can be exported.
+/// Returns a folder with a recording, and a sensor for each filter that can be exported.
 pub fn every_filter() -> Bench {
     static FILES: OnceLock<(String, [String; 4])> = OnceLock::new();
     let (trace, sensors) = FILES.get_or_init(|| {
@@ -195,15 +195,15 @@ pub fn every_filter() -> Bench {
     bench
 }
 
-/// Exports a sensor's default, scored on the recording; what was printed. A law of one branch is so poor that sign-split by itself is
-/// no better than a static cubic.
+/// Exports a sensor's default filter, scored on the recording; returns the output. A law of one branch is so poor that
+/// sign-split by itself is no better than a static cubic.
 fn scored_export(bench: &Bench, estimator: &str) -> String {
     let export = ["export", "--force", "--dt-s", DT_S, "--target", "c", "-o", estimator, "--score", "trace.csv"];
     bench.run(&[&export[..], &["--sensor", &format!("{estimator}.toml")]].concat()).ok()
 }
 
-/// A ten-thousandth of the gains and the noise: in single precision some steps are refused, and taken again. Without that, C says
-/// something else.
+/// With a ten-thousandth of the gains and the noise, some steps are refused in single precision and repeated. Otherwise the C
+/// code would give other results.
 #[test]
 fn steps_that_are_refused_are_taken_again_alike() {
     const QUIETER: [&str; 9] = [
@@ -238,7 +238,7 @@ fn steps_that_are_refused_are_taken_again_alike() {
             let once = source.replace("MOST_TRIES = 12", "MOST_TRIES = 0");
             assert_ne!(source, once);
             bench.write("quiet/src/once.c", once);
-            // Where it is farther off than rounding takes it, it ends with a failure, which is a panic here.
+            // If it differs by more than rounding, it ends with a failure, which is a panic here.
             let printed = std::panic::catch_unwind(|| self_test("src/once.c"));
             let printed = printed.unwrap_or_else(|failed| failed.downcast_ref::<String>().unwrap().clone());
             let is_another = printed.contains("largest difference: ") && !printed.contains("largest difference: 0 of ");
@@ -247,10 +247,10 @@ fn steps_that_are_refused_are_taken_again_alike() {
     }
 }
 
-/// A whole recording through the exported code, and through the program. What `export` has printed is the error of the very
-/// code. The default in single precision is as good as the program's: it may be worse by what an independent difference of 0.15
-/// deviations adds to a squared error, 0.15² = 2 %, and no more. (A filter of hypotheses without correction under a law as
-/// poor as this one merges other hypotheses where rounding differs, and may be better or worse by some per cent.)
+/// A whole recording through the exported code, and through the program. The error that `export` prints is that of the exported
+/// code itself. The default filter in single precision is as good as the program's: it may be worse by what an independent
+/// difference of 0.15 deviations adds to a squared error, 0.15² = 2 %. (A filter of hypotheses without correction under a law
+/// as poor as this one merges other hypotheses if rounding differs, and may be better or worse by some per cent.)
 #[test]
 fn a_recording_replayed_is_as_good_as_the_program() {
     let bench = every_filter();
@@ -278,7 +278,7 @@ fn a_recording_replayed_is_as_good_as_the_program() {
     }
 }
 
-/// Two calibrations in one program, linked together.
+/// Two sensors linked into one program.
 const TWO: &str = r#"
 #include "left.h"
 #include "right.h"
@@ -311,7 +311,7 @@ fn two_sensors_with_prefixes_live_in_one_program() {
     for compiler in compilers() {
         let sources = ["src/left.c", "src/right.c", "two.c"];
         assert_eq!(compile_and_run(compiler, &bench.path("two"), &sources, ""), "1 1\n");
-        // The last one's self-test knows its name.
+        // The last one's self-test uses its name.
         let sources = ["src/right.c", "selftest/selftest.c"];
         assert!(compile_and_run(compiler, &bench.path("two"), &sources, "").contains("self-test passed"));
     }
@@ -344,7 +344,7 @@ fn a_promise_is_of_the_default() {
     }
 }
 
-/// A byte order mark, and spaces around cells.
+/// A byte order mark, and spaces around cells, are accepted.
 #[test]
 fn a_recording_is_replayed_as_spreadsheets_write_it() {
     let bench = every_filter();
@@ -359,7 +359,7 @@ fn a_recording_is_replayed_as_spreadsheets_write_it() {
     }
 }
 
-/// A recording that pulls the plug: zero, an open circuit, an overload, a number that comes again.
+/// A recording with a pulled plug: zero, an open circuit, an overload, a repeated number.
 #[test]
 fn no_reading_stops_what_was_exported() {
     let bench = every_filter();
@@ -380,7 +380,7 @@ fn no_reading_stops_what_was_exported() {
         for compiler in compilers() {
             let sources = ["src/ohmstrain.c", "selftest/replay.c"];
             let printed = Csv::new(&compile_and_run(compiler, &bench.path(estimator), &sources, &trace));
-            // The last four of them say why there was no reading.
+            // The last four flags state why there was no reading.
             let why: Vec<f64> = printed.numbers("flags").iter().map(|flags| flags.rem_euclid(16.0)).collect();
             for (rows, flag) in [(100..110, 2.0), (200..210, 2.0), (300..310, 2.0), (400..410, 1.0)] {
                 assert!(why[rows].iter().all(|found| *found == flag), "{why:?}");
@@ -426,8 +426,9 @@ fn what_has_no_exported_form_is_refused_and_nothing_is_written() {
     assert!(!bench.path("out").exists());
 }
 
-/// Another day's R₀: every reading is 1.15 times what it was. Not told so, R₀ follows, in the exported code as in the program. Told so, the exported code says what it said: R/R₀ is the same to a
-/// rounding of 6e-8. (R₀ of the law is not what the rested sensor reads, here by some per cent.)
+/// Another day's R₀: every reading is multiplied by 1.15. Without today's R₀, both the exported code and the program adapt R₀.
+/// With it, the exported code repeats its estimates, since R/R₀ is the same to a rounding error of 6e-8. (R₀ of the law differs
+/// from the reading of the rested sensor, here by some per cent.)
 #[test]
 fn another_days_resistance_at_rest_can_be_told() {
     let bench = every_filter();
@@ -454,8 +455,8 @@ fn another_days_resistance_at_rest_can_be_told() {
             strains.iter().zip(expected).map(|(strain, expected)| (strain - expected).abs()).fold(0.0, f64::max)
         };
         let off = [farthest(&told, &expected), farthest(&untold, &expected)];
-        // Where R₀ is off hypotheses are nearly as likely as each other for longer, and readings are outside of what the correction
-        // has learned from: some rows may have another hypothesis, far fewer than are another strain if R₀ is told.
+        // While R₀ is wrong, hypotheses are nearly equally likely for longer, and readings are outside the correction's
+        // training range. Some rows may follow another hypothesis, far fewer than have another strain if R₀ is given.
         let apart =
             |some: &[f64], others: &[f64]| some.iter().zip(others).filter(|(a, b)| (*a - *b).abs() > 0.003).count();
         let unlike = |others: &[f64]| apart(&untold, others);
@@ -465,15 +466,16 @@ fn another_days_resistance_at_rest_can_be_told() {
             unlike(&program),
             unlike(&told)
         );
-        // Two hypotheses may be merged some rows earlier or later, since readings round otherwise: few rows, and not far.
+        // Two hypotheses may be merged some rows earlier or later, since readings round differently: few rows, and small
+        // differences.
         assert!(2.0 * off[0] < off[1] && off[1] > 0.03, "{off:?}");
         assert!(10 * apart(&told, &expected) < unlike(&expected), "{} rows", apart(&told, &expected));
         assert!(5 * unlike(&program) < unlike(&told) && 2 * unlike(&told) > rows);
     }
 }
 
-/// Half a minute at rest with an R₀ that has fallen by an eighth, then a motion: flag 512 in C, `rest_moved` in the program, from
-/// the same row on.
+/// Half a minute at rest with an R₀ that has fallen by an eighth, then a motion: flag 512 in C and `rest_moved` in the program
+/// begin in the same row.
 #[test]
 fn an_r0_that_has_fallen_is_flagged_as_by_the_program() {
     let bench = every_filter();
@@ -494,7 +496,7 @@ fn an_r0_that_has_fallen_is_flagged_as_by_the_program() {
         let flagged: Vec<bool> =
             Csv::new(&printed).numbers("flags").iter().map(|flags| flags.rem_euclid(1024.0) >= 512.0).collect();
         let differ = |(a, b): (&bool, &bool)| a != b;
-        // Sums of 0.2 s in single precision may reach ten seconds a row later.
+        // Sums of 0.2 s in single precision may reach ten seconds one row later.
         assert!(flagged.iter().zip(&expected).filter(|pair| differ(*pair)).count() <= 1, "{flagged:?} {expected:?}");
     }
 }

@@ -1,27 +1,28 @@
-//! Smaller filters for smaller chips: they fit, and the C is the twin that was scored, in faults, too.
+//! Smaller filters for smaller chips: they fit, and the C code equals the scored twin, also with faults.
 
 use crate::common::{Bench, Csv};
 use crate::export::{DT_S, compile_and_run, compilers, every_filter};
 
-/// Exports within a budget, scored on a recording; what was printed.
+/// Exports within a budget, scored on a recording; returns the output.
 fn within(bench: &Bench, sensor: &str, budget: &str, trace: &str, folder: &str) -> String {
     let export = ["export", "--dt-s", DT_S, "--target", "c", "-o", folder, "--budget", budget, "--force"];
     bench.run(&[&export[..], &["--sensor", sensor, "--score", trace]].concat()).ok()
 }
 
-/// A cell of the row of the exported code.
+/// Returns a cell in the row of the exported code.
 fn exported(printed: &str, column: usize) -> f64 {
     let row = printed.lines().find(|line| line.contains("| exported")).unwrap();
     row.split('|').nth(column).unwrap().trim().parse().unwrap()
 }
 
-/// Columns of its error, percent of full scale, and of what it costs.
+/// Columns of its error, percent of full scale, and of its cost.
 const ERROR: usize = 2;
 const INSTRUCTIONS: usize = 4;
 const FLASH: usize = 5;
 const RAM: usize = 6;
 
-/// A smaller filter equals its twin to the bit: a quadratic function and fewer rows are added up in the same order in both languages.
+/// A smaller filter equals its twin to the bit: a quadratic function and fewer rows are summed in the same order in both
+/// languages.
 #[test]
 fn a_smaller_filter_fits_and_is_its_twin() {
     let bench = every_filter();
@@ -40,7 +41,7 @@ fn a_smaller_filter_fits_and_is_its_twin() {
             assert!(tested.starts_with("largest difference: 0 of "), "{budget}, {compiler}: {tested}");
         }
     }
-    // By the table instead of a score: a quadratic function is among what fits.
+    // Chosen by the table instead of a score: a quadratic function is among the parts that fit.
     let export = ["export", "--sensor", "corrected.toml", "--dt-s", DT_S, "--target", "c", "-o", "small"];
     let printed = bench.run(&[&export[..], &["--budget", "flash=33000"]].concat()).ok();
     assert!(printed.contains("a quadratic function"), "{printed}");
@@ -69,7 +70,8 @@ fn what_does_not_fit_is_said() {
     assert!(!bench.path("none").exists());
 }
 
-/// All candidates with what they cost, and what the next better one takes too much of: by the order of the table, or by their errors.
+/// All candidates are printed with their costs, and the resource that the next better one exceeds, in the order of the table or
+/// of their errors.
 #[test]
 fn candidates_and_what_keeps_the_next_better_one_out_are_said() {
     let bench = every_filter();
@@ -80,14 +82,14 @@ fn candidates_and_what_keeps_the_next_better_one_out_are_said() {
     let next = printed.lines().find(|line| line.starts_with("the next better one, ")).unwrap();
     assert!(next.ends_with(" B of flash where 33000 are free"), "{next}");
     let scored = within(&bench, "corrected.toml", "lean", "trace.csv", "asked");
-    // What is exported has the least error of those that fit.
+    // The exported filter has the smallest error of those that fit.
     let error = |row: &str| row.split('|').nth(2).unwrap().trim().parse::<f64>().unwrap();
     let fitting = scored.lines().filter(|line| line.trim_end().ends_with("| yes  |")).map(error);
     assert!((fitting.fold(f64::MAX, f64::min) - exported(&scored, ERROR)).abs() < 0.006, "{scored}");
     if let Some(next) = scored.lines().find(|line| line.starts_with("the next better one, ")) {
         assert!(next.ends_with(" instructions where 15000 are free"), "{next}");
     }
-    // Nothing to choose, nothing to say.
+    // Without a choice, nothing is printed.
     assert!(!bench.run(&export).ok().contains("candidate"));
 }
 
@@ -126,7 +128,7 @@ fn a_board_is_a_budget() {
     assert!(unknown.stderr.contains("no board is called duo; boards: uno, nano"), "{}", unknown.stderr);
 }
 
-/// A recording's reading with a fault.
+/// A reading of a recording with a fault.
 type Fault = (&'static str, fn(usize, f64) -> f64);
 
 const FAULTS: [Fault; 6] = [
@@ -138,7 +140,7 @@ const FAULTS: [Fault; 6] = [
     ("a tenth more from half-way", |row, ohm| if row > 1000 { 1.1 * ohm } else { ohm }),
 ];
 
-/// The error that `export` prints is that of the compiled program, whatever happens to the readings.
+/// The error that `export` prints is that of the compiled program, whatever the readings are.
 #[test]
 fn the_compiled_program_answers_faults_as_its_twin() {
     let bench = every_filter();

@@ -1,4 +1,4 @@
-//! Exported C of sensors that have, or have not, each optional part: it compiles strictly, says of the sensor what is so, and passes
+//! Exported C of sensors with and without each optional part: it compiles strictly, describes the sensor correctly, and passes
 //! its self-test without a difference.
 
 use std::process::Command;
@@ -9,7 +9,7 @@ use toml::{Table, Value};
 use crate::common::Bench;
 use crate::export::{compile, compilers, run_program};
 
-/// Name of a part, and its forms.
+/// Name of a part, and its variants.
 type Part = (&'static str, &'static [&'static str]);
 
 const PARTS: [Part; 12] = [
@@ -27,10 +27,11 @@ const PARTS: [Part; 12] = [
     ("readings", &["err apart", "err alike, never repeat"]),
 ];
 
-/// One form of each part, by number.
+/// One variant of each part, by index.
 type Choice = [usize; PARTS.len()];
 
-/// Choices in which every two forms of two parts occur together: each takes up pairs that are left, the most that it can.
+/// Returns choices in which every two variants of two parts occur together: each covers as many of the remaining pairs as
+/// possible.
 fn all_pairs() -> Vec<Choice> {
     let forms = |part: usize| 0..PARTS[part].1.len();
     let mut left = Vec::new();
@@ -62,14 +63,14 @@ fn all_pairs() -> Vec<Choice> {
     choices
 }
 
-/// A sensor of a choice.
+/// The sensor of a choice.
 struct Variant {
     choice: Choice,
     sensor: Table,
 }
 
 impl Variant {
-    /// Made of one that was calibrated, by other parameters.
+    /// Creates it from a calibrated sensor with other parameters.
     fn new(choice: Choice) -> Self {
         let text = include_str!("../../../tests/fixtures/representative.toml");
         let mut variant = Self { choice, sensor: text.parse().unwrap() };
@@ -201,12 +202,12 @@ impl Variant {
         self.sensor[name].as_table_mut().unwrap()
     }
 
-    /// All forms, for a message.
+    /// Returns all variants, for a message.
     fn name(&self) -> String {
         PARTS.iter().map(|(part, _)| format!("{part} {}", self.form(part))).collect::<Vec<_>>().join(", ")
     }
 
-    /// Exports it, compiles all of it and runs the self-test.
+    /// Exports it, compiles everything and runs the self-test.
     fn check(&self, bench: &Bench) {
         let name = self.name();
         bench.write("sensor.toml", toml::to_string(&self.sensor).unwrap());
@@ -232,7 +233,7 @@ impl Variant {
         }
     }
 
-    /// Checks the words on where the sensor rested, and on zero.
+    /// Checks the text on the sensor's rest and on zero strain.
     fn check_words(&self, bench: &Bench) {
         let (readme, header) = (bench.read("c/README.md"), bench.read("c/src/ohmstrain.h"));
         let never = self.is("rest", "never");
@@ -245,11 +246,11 @@ impl Variant {
     }
 }
 
-/// An Arduino that is none.
+/// A stand-in for Arduino.
 const ARDUINO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scripts/exported-c");
 
-/// The same functions of the same numbers in the same order: only the exponentials of two libraries could differ, and both
-/// languages call the one of the host.
+/// The same functions of the same numbers in the same order. Only the exponentials of two libraries could differ, and both
+/// languages call that of the host.
 #[test]
 fn exported_c_of_any_two_parts_together_compiles_strictly_and_is_the_rust_filter() {
     let choices = all_pairs();

@@ -1,18 +1,18 @@
-//! A pause of any length: exported C says of it, and after it, what `filter` says.
+//! Pauses of any length: during and after them, exported C gives the estimates of `filter`.
 
 use std::fmt::Write;
 
 use crate::common::{Bench, Csv};
 use crate::export::{compile, compile_and_run, compilers, run_program};
 
-/// Lengths of the pause, s: from next to none to a month. The shortest is the shortest step of a chip.
+/// Lengths of the pause, s: from almost nothing to a month. The shortest is the shortest step of a chip.
 const PAUSES_S: [f64; 8] = [0.004, 0.5, 7.0, 20.0, 60.0, 3600.0, 86_400.0, 2_592_000.0];
 const DT_S: f64 = 0.05;
-/// Rows before the pause of a filter that runs, and after it.
+/// Number of rows before the pause, if the filter has started, and after it.
 const BEFORE: usize = 400;
 const AFTER: usize = 200;
 
-/// The fixture's sensor, with a filter by the sign of the rate beside its others.
+/// Returns the fixture's sensor, with a sign-split filter beside its others.
 fn sensor() -> String {
     let mut sensor: toml::Table = include_str!("../../../tests/fixtures/representative.toml").parse().unwrap();
     let estimators = sensor["estimators"].as_table_mut().unwrap();
@@ -21,10 +21,10 @@ fn sensor() -> String {
     toml::to_string(&sensor).unwrap()
 }
 
-/// Readings of a slow motion, then a pause that ends without a reading, then readings again.
+/// Returns readings of a slow motion, then a pause that ends without a reading, then readings again.
 fn recording(before: usize, pause_s: f64) -> String {
     let reading = |row: usize| 4600.0 + 1100.0 * (0.6 * DT_S * row as f64).sin() + (row % 7) as f64;
-    // A chip's first step takes an interval, a recording's no time.
+    // A chip's first step takes an interval, that of a recording takes no time.
     let mut text = format!("time_s,resistance_ohm\n{},\n", -DT_S);
     for row in 0..before {
         let _ = writeln!(text, "{},{}", DT_S * row as f64, reading(row));
@@ -37,13 +37,14 @@ fn recording(before: usize, pause_s: f64) -> String {
     text
 }
 
-/// Strain and deviation, from the pause's end on.
+/// Returns strain and deviation, from the pause's end on.
 fn since_the_pause(printed: &str, before: usize) -> Vec<(f64, f64)> {
     let table = Csv::new(printed);
     table.numbers("strain").into_iter().zip(table.numbers("strain_sd")).skip(1 + before).collect()
 }
 
-/// Pauses before any reading and after some, some of them ended by a reading: from none to lengths whose squares exceed single precision.
+/// Pauses before any reading and after some, some of them ended by a reading. Their lengths range from zero to values whose
+/// squares exceed single precision.
 const ANY: &str = r#"
 #include "ohmstrain.h"
 #include <math.h>
@@ -117,9 +118,9 @@ fn a_pause_of_any_length_is_answered_as_by_the_program() {
     }
     assert!(answers.iter().all(|answer| answer.ends_with(": 0 refused, 0 unsaid\n")), "{answers:?}");
     for (estimator, at_end, after) in &worst {
-        // One Gaussian: single precision, of which a correction that is far from its rows makes most. Hypotheses: the direction is a
-        // polynomial on a chip and an exponential on a computer, which leaves a quarter of a deviation in seconds of a pause, and
-        // others of them after it.
+        // A single Gaussian differs by single precision, mostly where a correction is far from its rows. With hypotheses, the
+        // direction is a polynomial on a chip and an exponential on a computer; this leaves a quarter of a deviation in seconds
+        // of a pause, and other hypotheses after it.
         let (most_at_end, most_after) = if *estimator == "ekf" { (0.02, 0.1) } else { (0.3, 3.0) };
         assert!(*at_end < most_at_end && *after < most_after, "{worst:?}");
     }

@@ -1,9 +1,9 @@
-//! Each protection can be turned off, and is then off in exported C as it is in the program.
+//! Each protection can be turned off, in exported C as in the program.
 
 use crate::common::{Bench, Csv, change_rows};
 use crate::export::{compile_and_run, compilers};
 
-/// Switches that turn a protection off in C, and in the program.
+/// Switches that turn off a protection in C, and in the program.
 const SWITCHES: [(&str, &[&str]); 5] = [
     ("-DOHMSTRAIN_WITHOUT_PLAUSIBILITY", &["--without", "plausibility"]),
     ("-DOHMSTRAIN_WITHOUT_INFLUENCE", &["--influence", "none"]),
@@ -12,7 +12,7 @@ const SWITCHES: [(&str, &[&str]); 5] = [
     ("-DOHMSTRAIN_WITHOUT_DOUBTS", &["--without", "doubts"]),
 ];
 
-/// Returns a reading with a fault for each of them: an unplugging, spikes, a bad contact, a number that is stuck, another day.
+/// Returns a reading with a fault for each of them: an unplugged sensor, spikes, a bad contact, a stuck number, another day.
 fn faulty(row: usize, ohm: f64) -> f64 {
     match row {
         800..840 => 210_000.0,
@@ -24,13 +24,14 @@ fn faulty(row: usize, ohm: f64) -> f64 {
     }
 }
 
-/// Strain and its deviation, row by row, but for the first: a chip's first step takes an interval, a recording's no time.
+/// Returns strain and its deviation, row by row, without the first row: a chip's first step takes an interval, that of a
+/// recording takes no time.
 fn estimates(printed: &str) -> Vec<(f64, f64)> {
     let table = Csv::new(printed);
     table.numbers("strain").into_iter().zip(table.numbers("strain_sd")).skip(100).collect()
 }
 
-/// The rows in which two differ by more than `share` of the deviation.
+/// Returns the number of rows in which two differ by more than `share` of the deviation.
 fn apart(a: &[(f64, f64)], b: &[(f64, f64)], share: f64) -> usize {
     let differ = |((x, sd), (y, other)): (&(f64, f64), &(f64, f64))| {
         (x - y).abs() > share * other || (sd / other - 1.0).abs() > share

@@ -11,7 +11,7 @@ fn evaluate_draws_the_part_that_is_scored() {
         bench.run(&[&flags[..], &from[..]].concat()).ok();
     }
     let report = bench.read("report.html");
-    // Three quarters of the rows were calibrated on: those before.
+    // Three quarters of the rows, the earlier ones, were calibrated on.
     assert!(report.contains("not calibrated on, scored from 300 s on") && report.contains("estimator “ekf”"));
     assert!(report.contains("scored part") && !report.contains("in-sample"));
     bench.run(&flags).ok();
@@ -41,7 +41,7 @@ fn evaluate_draws_the_part_that_is_scored() {
     ] {
         assert!(names(".svg").iter().any(|name| name == wanted), "{wanted}: {files:?}");
     }
-    // One scale, so that letters are of one size: millimetres of paper per unit of the drawing.
+    // A common scale, so that letters have the same size: millimetres of paper per unit of the drawing.
     let scale = |name: &String| -> f64 {
         let svg = bench.read(&format!("figures/{name}.svg"));
         let between = |start: &str, end: &str| svg.split(start).nth(1).unwrap().split(end).next().unwrap().to_owned();
@@ -51,7 +51,7 @@ fn evaluate_draws_the_part_that_is_scored() {
     };
     let scales: Vec<f64> = names(".svg").iter().map(scale).collect();
     assert!(scales.iter().all(|scale| (scale / scales[0] - 1.0).abs() < 1e-9), "{scales:?}");
-    // What is drawn as dots is a dot in the legend.
+    // A series drawn as dots has a dot in the legend.
     assert!(bench.read("figures/gauge-curve.svg").split("<g transform").next().unwrap().contains("<circle "));
     // The reference in the CSV is the recording's: strain in percent, between 0 and 10 mm on 30 mm.
     let csv = bench.read("figures/strain-against-time.csv");

@@ -1,4 +1,4 @@
-//! `fit-law`: what it prints for recordings whose law is known, and what it refuses.
+//! `fit-law`: output for recordings with a known law, and refusals.
 
 use crate::common::Bench;
 
@@ -7,7 +7,7 @@ const CONTENT: i32 = 4;
 /// Exit code for arguments.
 const ARGUMENTS: i32 = 2;
 
-/// Two stretches with holds and rests, as the simulator makes them.
+/// Two stretches with holds and rests by the simulator.
 const SIMULATE: [&str; 7] = ["simulate", "--protocol", "extend-hold", "--sample-rate-hz", "10", "-o", "trace.csv"];
 
 fn simulated() -> Bench {
@@ -38,7 +38,7 @@ fn json(bench: &Bench, arguments: &[&str]) -> serde_json::Value {
     serde_json::from_str(&bench.run(&[&["fit-law", "--json"], arguments].concat()).ok()).unwrap()
 }
 
-/// A parameter or derived quantity of a fit.
+/// Returns a parameter or derived quantity of a fit.
 #[track_caller]
 fn value(fit: &serde_json::Value, name: &str) -> f64 {
     let all = ["parameters", "derived"].into_iter().flat_map(|group| fit[group].as_array().unwrap());
@@ -58,8 +58,8 @@ fn the_published_laws_come_back() {
         (fit["recording"].as_str(), fit["segment"].as_str(), fit["law"].as_str(), fit["material"].as_str()),
         (Some("trace.csv"), Some("extend:1+hold:2"), Some("eq8+eq9"), Some("paper"))
     );
-    // The segments' borders are found to a row or two, 0.2 s of τ₀ = 6 s: the law shifted in time by that much is off by
-    // a few percent in its parameters.
+    // The segments' borders are found to a row or two, 0.2 s against τ₀ = 6 s. A shift of the law in time by that much changes
+    // its parameters by a few percent.
     for (name, truth) in [("r0", 2000.0), ("tau0_s", 6.0), ("v*eta+r1", 1600.0), ("r0_hold", 0.1)] {
         let found = value(fit, name);
         assert!((found / truth - 1.0).abs() < 0.05, "{name}: {found}");
@@ -108,7 +108,7 @@ fn a_law_that_contains_another_fits_no_worse() {
         let nested = [sum(law, "single"), sum(law, "eq6"), sum(law, "eq7:2")];
         for pair in nested.windows(2) {
             for (small, large) in pair[0].iter().zip(&pair[1]) {
-                // Equal where the added parameter does nothing, but for the last digits of the optimiser.
+                // Equal where the added parameter has no effect, apart from the optimiser's last digits.
                 assert!(*large <= small * (1.0 + 1e-6), "{law}: {large} after {small}");
             }
         }
@@ -139,7 +139,7 @@ fn laws_of_time_need_no_reference() {
     let rows = (0..50).map(|i| format!("{i},{}\n", 1000.0 + 50.0 * (-f64::from(i) / 7.0).exp()));
     bench.write("trace.csv", format!("time_s,resistance_ohm\n{}", rows.collect::<String>()));
     let report = json(&bench, &["--law", "eq9", "--segment", "whole", "trace.csv"]);
-    // The readings are exact but for rounding.
+    // The readings are exact, apart from rounding.
     assert!((value(&report["fits"][0], "tau0_s") - 7.0).abs() < 1e-6);
     assert!((value(&report["fits"][0], "r_start") - 1050.0).abs() < 1e-6);
     bench.run(&["fit-law", "--law", "eq9", "trace.csv"]).fails(
@@ -162,7 +162,7 @@ fn the_table_has_one_row_per_material_speed_and_phase() {
     let rows: Vec<Vec<&str>> =
         printed.lines().map(|line| line.trim_matches('|').split('|').map(str::trim).collect()).collect();
     assert_eq!(rows[0][..4], ["material", "speed, mm/s", "phase", "segments"]);
-    // What does not fit a terminal goes on below.
+    // Columns that do not fit a terminal continue below.
     let last = rows.iter().rposition(|row| row[0] == "material").unwrap();
     assert!(last > 0 && rows[last].last() == Some(&"R^2"), "{printed}");
     let found: Vec<(&str, i32, &str, &str)> =
@@ -201,13 +201,13 @@ fn what_cannot_be_fitted_is_refused() {
 fn laws_are_compared_on_the_same_readings() {
     let bench = Bench::new();
     bench.write("trace.csv", as_printed());
-    // One exponential made the hold: laws with more parameters fit as well, and cost more.
+    // The hold is one exponential: laws with more parameters fit as well, and cost more.
     let csv = bench.run(&["fit-law", "trace.csv", "--compare", "prony:2,prony:1,kww", "--format", "csv"]).ok();
     let rows: Vec<Vec<&str>> = csv.lines().skip(1).map(|line| line.split(',').collect()).collect();
     assert_eq!(rows.len(), 3, "{csv}");
     assert!(rows.iter().all(|row| row[4].parse::<f64>().unwrap() > 0.999), "{csv}");
     assert!(rows.iter().any(|row| row[6] == "0"), "{csv}");
-    // With all digits: what a terminal shows is fewer.
+    // With all digits; a terminal shows fewer.
     assert!(rows.iter().all(|row| row[5].parse::<f64>().is_ok()) && rows[1][6].len() > 6, "{csv}");
     assert!(csv.starts_with("recording,segment,law,parameters,R^2,\"residual sd, ohm\","), "{csv}");
     let json = bench.run(&["fit-law", "trace.csv", "--compare", "prony:2,prony:1,kww", "--json"]).ok();
@@ -235,7 +235,7 @@ fn fits_come_as_csv_latex_and_figures() {
     let column =
         csv.lines().next().unwrap().replace(", ", " ").split(',').position(|name| name.starts_with("tau0")).unwrap();
     let tau0: f64 = lines[1][column].parse().unwrap();
-    // Where the movement begins and ends is found to a row: 0.1 s of 10.
+    // The ends of the movement are found to a row: 0.1 s of 10 s.
     assert!((tau0 / 6.0 - 1.0).abs() < 0.01, "{csv}");
     let latex = bench.run(&["fit-law", "trace.csv", "--table", "--format", "latex"]).ok();
     assert!(
@@ -244,7 +244,7 @@ fn fits_come_as_csv_latex_and_figures() {
     );
     let files = crate::common::files_in(&bench.path("figures"));
     assert_eq!(files, ["01-eq8-eq9-extend-1-hold-2.csv", "01-eq8-eq9-extend-1-hold-2.svg"]);
-    // The drawn law meets the reading where the movement ends: 2000 exp(-10/6) 0.2 + 1600.
+    // The drawn law meets the reading at the end of the movement: 2000 exp(-10/6) 0.2 + 1600.
     let drawn = bench.read("figures/01-eq8-eq9-extend-1-hold-2.csv");
     let end = 2000.0 * (-10.0_f64 / 6.0).exp() * 0.2 + 1600.0;
     let law = drawn.lines().filter(|line| line.starts_with("\"eq8+eq9"));
@@ -258,7 +258,7 @@ fn fits_come_as_csv_latex_and_figures() {
     assert!((found - end).abs() < 1.5, "{found} {end}");
 }
 
-/// A movement explains nearly all of the variance, and hides that the hold goes another way.
+/// A movement explains nearly all of the variance, and hides that the hold deviates.
 #[test]
 fn a_phase_that_its_law_does_not_describe_is_warned_of() {
     let bench = Bench::new();

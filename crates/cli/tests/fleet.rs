@@ -1,4 +1,4 @@
-//! Priors from sensors of one make for the next one.
+//! Priors learned from sensors of one make for the next sensor.
 
 use crate::common::Bench;
 use serde_json::Value;
@@ -17,7 +17,7 @@ const SIMULATE: [&str; 10] = [
 ];
 const CALIBRATED_S: &str = "150";
 
-/// Sensors 1 to 4 of a make, calibrated on 150 s, what they have in common, and a recording of the ninth.
+/// Returns sensors 1 to 4 of a make, calibrated on 150 s, their prior, and a recording of the ninth sensor.
 fn fleet() -> Bench {
     let bench = Bench::new();
     for sensor in ["1", "2", "3", "4", "9"] {
@@ -36,7 +36,7 @@ fn calibrate(bench: &Bench, trace: &str, until_s: &str, sensor: &str, flags: &[&
     bench.run(&[&words[..], flags].concat()).ok();
 }
 
-/// Error in percent of the range after the calibration, and the interval's coverage.
+/// Returns the error after the calibration, percent of the range, and the interval's coverage.
 fn score(bench: &Bench, sensor: &str) -> (f64, f64) {
     let words = ["evaluate", "9.csv", "--sensor", sensor, "--from", CALIBRATED_S, "--json"];
     let said: Value = serde_json::from_str(&bench.run(&words).ok()).unwrap();
@@ -44,8 +44,8 @@ fn score(bench: &Bench, sensor: &str) -> (f64, f64) {
     (of("rmse_percent_fs"), of("coverage_95"))
 }
 
-/// A short motion is enough with a prior: on twelve other sensors 10 s with a prior of 30 came to 0.37 of the error
-/// without, in the median; here are four.
+/// A short motion is enough with a prior. On twelve other sensors, 10 s with a prior from 30 sensors gave 0.37 of the error
+/// without it, in the median; here the prior is from four.
 #[test]
 fn a_short_motion_is_enough_with_a_prior() {
     let bench = fleet();
@@ -61,11 +61,11 @@ fn a_short_motion_is_enough_with_a_prior() {
         (toml::from_str(&bench.read("prior.toml")).unwrap(), toml::from_str(&bench.read("taught.toml")).unwrap());
     let first = &own["law"]["branches"][0]["tau_s"];
     assert!((first.as_float().unwrap() / of_make["law"]["tau_s"][0].as_float().unwrap() - 1.0).abs() < 1e-12);
-    // Strains that the ten seconds have not seen are within what the make's law holds for.
+    // Strains beyond those of the ten seconds are within the range of the make's law.
     assert!(own["limits"]["upper"].as_float().unwrap() >= of_make["validity"]["upper"].as_float().unwrap());
 }
 
-/// The prior of one make is of no use to another one that was recorded for as long.
+/// A prior has no effect on a sensor of another make that was recorded for as long as the sensors of the prior.
 #[test]
 fn a_long_motion_stands_for_itself() {
     let bench = fleet();
@@ -77,7 +77,7 @@ fn a_long_motion_stands_for_itself() {
     assert_eq!(bench.read("taught.toml"), bench.read("alone.toml"));
 }
 
-/// Each of a batch is calibrated as the command calibrates it alone; another prior is another work.
+/// Each sensor of a batch is calibrated as by the command alone; another prior means another job.
 #[test]
 fn a_batch_learns_from_a_prior() {
     let bench = fleet();
@@ -104,10 +104,10 @@ fn a_batch_learns_from_a_prior() {
     let (again, of_another) = state(&taught, 5);
     assert_eq!(again, "done");
     assert!(of_another.is_some() && of_another != of_prior);
-    // A manifest's prior lies where its recordings do.
+    // A prior in a manifest is relative to the manifest, as recordings are.
     state(&[&batch[..], &["--manifest", "rig/manifest.csv", "--"], &flags].concat(), 0);
     assert_eq!(bench.read("out/listed.toml"), bench.read("out/9.toml"));
-    // What is no prior fails each of them, and is no output's place.
+    // A file that is not a prior fails each job, and cannot be an output.
     bench.write("none.toml", "format = 4\n");
     assert_eq!(state(&[&batch[..], &["rig/9.csv", "--", "--prior", "none.toml"]].concat(), 5).0, "failed");
     std::fs::create_dir(bench.path("out2")).unwrap();

@@ -1,8 +1,8 @@
-//! Text of files and their names on its way to a terminal: nothing in it moves, colours or reorders what stands around it.
+//! Text of files and file names on its way to a terminal: nothing in it moves, colours or reorders its surroundings.
 
 use crate::common::{Bench, Run};
 
-/// Red, a cleared screen by a control of eight bits, and a text that runs backwards.
+/// Red text, a screen cleared by an 8-bit control, and right-to-left text.
 const EVIL: &str = "\u{1b}[31mred\u{9b}2J\u{202e}vsc";
 
 #[track_caller]
@@ -10,7 +10,7 @@ fn assert_printable(run: &Run) {
     let said = [&run.stdout, &run.stderr, &run.warnings.concat()].map(String::as_str).concat();
     let is_shown = |c: char| c == '\n' || !(c.is_control() || ('\u{202a}'..='\u{202e}').contains(&c));
     assert!(said.chars().all(is_shown), "{}: {said:?}", run.command);
-    // The arguments' parser leaves the colour out.
+    // The argument parser drops the colour.
     let shown = ["\\u{1b}[31mred", "\\u001b[31mred", "red\\u{9b}2J"];
     assert!(shown.iter().any(|shown| said.contains(shown)), "{}: {said}", run.command);
 }
@@ -21,7 +21,7 @@ fn what_is_said_of_files_can_be_printed() {
     let name = if cfg!(windows) { "evil.csv".to_owned() } else { format!("{EVIL}.csv") };
     let rows: String = (0..40).map(|row| format!("{}.5,{},{}\n", row, 1600 + row % 7, row % 5)).collect();
     bench.write(&name, format!("Time (s),R {EVIL} (Ohm),Displacement (mm)\n{rows}"));
-    // As TOML writes it: control characters themselves are no TOML.
+    // In TOML's escapes, since control characters themselves are invalid.
     let escape = |c: char| if c.is_ascii_graphic() { c.to_string() } else { format!("\\u{:04x}", u32::from(c)) };
     let escaped: String = EVIL.chars().map(escape).collect();
     bench.write("evil.toml", format!("format = 9\nmade_by = \"ohmstrain 0.1.0\"\nquantity = \"{escaped}\"\n"));
@@ -36,7 +36,7 @@ fn what_is_said_of_files_can_be_printed() {
         &["filter", "bad.csv", "--sensor", "sensor.toml"],
         &["calibrate", "meta.csv", "-o", "new.toml"],
         &["smooth", "trace.csv", "--sensor", "sensor.toml", "--columns", &columns],
-        // What the arguments' parser says.
+        // Message of the argument parser.
         &["smooth", "trace.csv", "--sensor", "sensor.toml", EVIL],
     ];
     for arguments in commands {
@@ -44,7 +44,7 @@ fn what_is_said_of_files_can_be_printed() {
     }
 }
 
-/// JSON keeps what it holds.
+/// JSON contains the text itself.
 #[test]
 fn json_holds_the_text_itself() {
     let bench = Bench::new();
@@ -55,7 +55,7 @@ fn json_holds_the_text_itself() {
     assert!(heading.contains("\u{9b}2J\u{202e}vsc"), "{heading:?}");
 }
 
-/// A command that is to be copied into a shell can be printed, and does what it says.
+/// A suggested command can be printed, copied into a shell, and run.
 #[cfg(unix)]
 #[test]
 fn a_suggested_command_names_any_file() {

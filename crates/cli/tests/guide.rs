@@ -1,4 +1,4 @@
-//! Every command of the guide runs: the blocks marked `sh` of a chapter, one after the other, in a folder of their own.
+//! Every command of the guide runs: the blocks marked `sh` of a chapter, one after another, in a folder of their own.
 #![cfg(unix)]
 
 use std::env;
@@ -13,7 +13,7 @@ fn chapters() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../guide/src")
 }
 
-/// The commands of a chapter; a command that fails ends them.
+/// Returns the commands of a chapter; the first that fails ends them.
 fn script(text: &str) -> String {
     let mut script = String::from("set -eu\n");
     let mut is_code = false;
@@ -66,7 +66,7 @@ fn import() {
     let (bench, imported) = (columns("bench.csv"), columns("imported.csv"));
     assert_eq!(bench.len(), imported.len());
     for (a, b) in bench.iter().zip(&imported) {
-        // Half a digit of what the rig's file has: 1 ms, 1e-6 kΩ, 1e-5 mm on 30 mm.
+        // Half a unit of the last digit in the rig's file: 1 ms, 1e-6 kΩ, 1e-5 mm on 30 mm.
         let rounded = [1e-3, 0.5e-3, 0.5e-5 / 30.0];
         assert!(a.iter().zip(b).zip(rounded).all(|((a, b), most)| (a - b).abs() <= 1.001 * most), "{a:?} {b:?}");
     }
@@ -82,7 +82,7 @@ fn filter() {
     holds(&run("filter.md"), &["estimates.csv", "smoothed.csv", "hand.toml", "hand-thumb.toml", "strains.csv"]);
 }
 
-/// Five fingers that were calibrated on what a person does know their angles on another day.
+/// Five fingers, calibrated on a person's known angles, estimate their angles on another day.
 #[test]
 fn glove() {
     let folder = run("glove.md");

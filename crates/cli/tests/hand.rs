@@ -1,14 +1,14 @@
-//! A hand of five fingers, simulated and calibrated one by one, then all of them in one recording; and what `plan` says.
+//! A hand of five fingers, simulated and calibrated one by one, then all of them in one recording; and the output of `plan`.
 
 use crate::common::{Bench, Csv, Run, change_rows};
 
 const FINGERS: [&str; 5] = ["thumb", "index", "middle", "ring", "little"];
-/// A third of its length is what the simulated sensor is stretched by; that is 90° over 6.4 mm on 30 mm.
+/// The simulated sensor is stretched by a third of its length; that is 90° over 6.4 mm on 30 mm.
 const JOINT: &str = "prestrain=0 moment_arm_mm=6.4 gauge_length_mm=30";
 /// Scale of `JOINT`, degrees per strain.
 const DEGREES: f64 = 180.0 / std::f64::consts::PI * 30.0 / 6.4;
 
-/// A folder with a sensor and a recording per finger, `hand.toml`, and `hand.csv` with all readings.
+/// Returns a folder with a sensor and a recording per finger, `hand.toml`, and `hand.csv` with all readings.
 fn hand() -> (Bench, usize) {
     let bench = Bench::new();
     let mut traces = vec![];
@@ -35,7 +35,7 @@ fn hand() -> (Bench, usize) {
 }
 
 fn in_kiloohm(number: f64) -> String {
-    // Times stay as they are.
+    // Times are not changed.
     if number > 1000.0 { (number / 1000.0).to_string() } else { number.to_string() }
 }
 
@@ -47,14 +47,14 @@ fn all_angles_of_a_hand() {
     assert!(angles.header.starts_with("time_s,thumb_deg,thumb_sd_deg,index_deg,"));
     assert_eq!(angles.len(), rows);
     for finger in FINGERS {
-        // Each finger is what `filter` makes of it alone.
+        // Each finger's estimates equal those of `filter` alone.
         let alone =
             bench.run(&["filter", &format!("{finger}.csv"), "--sensor", &format!("{finger}.toml"), "--joint", JOINT]);
         let alone = Csv::new(&alone.ok());
         assert_eq!(angles.cells(&format!("{finger}_deg")), alone.cells("angle_deg"), "{finger}");
         assert_eq!(angles.cells(&format!("{finger}_sd_deg")), alone.cells("angle_sd"), "{finger}");
     }
-    // Into a file, twice: its own output is replaced without a word, an input never.
+    // Into a file, twice: its own output is replaced silently, an input never.
     for _ in 0..2 {
         assert_eq!(bench.run(&["hand", "hand.toml", "hand.csv", "-o", "angles.csv"]).ok(), "");
         assert_eq!(bench.read("angles.csv"), shown);
@@ -65,7 +65,7 @@ fn all_angles_of_a_hand() {
     let strict = bench.feed(&["hand", "hand.toml"], garbage.clone());
     assert_eq!(strict.code, Some(4), "{}", strict.stderr);
     let skipping = bench.feed(&["hand", "hand.toml", "--skip-bad"], garbage);
-    // Of a recording that breaks off in an error the file stays as it was.
+    // If a recording ends in an error, the output file is unchanged.
     bench.write("broken.csv", bench.read("hand.csv") + "1e9,1,2\n");
     assert_eq!(bench.run(&["hand", "hand.toml", "broken.csv", "-o", "angles.csv"]).code, Some(4));
     assert_eq!(bench.read("angles.csv"), shown);
@@ -74,7 +74,7 @@ fn all_angles_of_a_hand() {
 
     let refused = bench.run(&["hand", "hand.toml", "thumb.csv"]);
     assert!(refused.code == Some(4) && refused.stderr.contains("expected a column `thumb_ohm`"), "{}", refused.stderr);
-    // Another unit is asked about, a file that is something else is called so.
+    // Another unit raises a question, a file of another kind is named as such.
     let column =
         |row: &str| row.split(',').map(|cell| cell.parse().map_or(cell.to_owned(), in_kiloohm)).collect::<Vec<_>>();
     let kohm: Vec<String> = bench.read("hand.csv").lines().map(|row| column(row).join(",")).collect();
@@ -101,8 +101,8 @@ fn all_angles_of_a_hand() {
     assert!(refused.code == Some(4) && refused.stderr.contains("odd.toml:4: unknown field"), "{}", refused.stderr);
 }
 
-/// A sensor that was calibrated on ratios, given ohms, or the reverse: by the column's name, the electronics, the line above the
-/// header, or the readings themselves, of however few rows. So is R0 of no such sensor.
+/// A sensor calibrated on ratios but given ohms, or the reverse, is detected by the column's name, the electronics, the line
+/// above the header, or the readings themselves, however few. So is an R0 that cannot be the sensor's.
 #[test]
 fn ohms_and_ratios_are_told_apart() {
     let bench = Bench::calibrated();
@@ -154,7 +154,7 @@ fn ohms_and_ratios_are_told_apart() {
 #[test]
 fn a_plan_says_what_recordings_tell_and_what_sampling_leaves() {
     let bench = Bench::calibrated();
-    // One branch: of more, motions without long holds tell next to nothing, and what they tell is chance.
+    // One branch: motions without long holds contain almost no information on more branches, and that is random.
     let calibrate = ["calibrate", "trace.csv", "--estimator", "ekf", "--branches", "1", "-o", "sensor.toml", "--force"];
     bench.run(&calibrate).ok();
     let json = bench.run(&["plan", "--sensor", "sensor.toml", "--joint", JOINT, "--json"]).ok();
@@ -162,7 +162,8 @@ fn a_plan_says_what_recordings_tell_and_what_sampling_leaves() {
     let recordings = plan["recordings"].as_array().unwrap();
     let told = |place: usize| recordings[place]["told"].as_u64().unwrap();
     let condition = |place: usize| recordings[place]["condition"].as_f64().unwrap();
-    // At one speed rate and strain go together; each further recording tells them apart better. One speed tells less than three of them with holds.
+    // At a single speed, rate and strain are correlated; each further recording separates them better. One speed determines
+    // fewer parameters than three with holds.
     assert!(recordings.len() == 4 && told(0) <= told(3) && condition(0) > 100.0 * condition(3), "{json}");
     let sampling = plan["sampling"].as_array().unwrap();
     assert_eq!(sampling.len(), 16);
@@ -172,11 +173,11 @@ fn a_plan_says_what_recordings_tell_and_what_sampling_leaves() {
             (0.0..100.0).contains(&number("error_percent")) && (0.0..=100.0).contains(&number("coverage_percent")),
             "{one}"
         );
-        // A percent of the range is a third of a percent of strain, and that an angle.
+        // A percent of the range is a third of a percent of strain, which is converted to an angle.
         let degrees = DEGREES / 3.0 * number("error_percent") / 100.0;
         assert!((number("angle_deg") / degrees - 1.0).abs() < 1e-3, "{one}");
     }
-    // Exact readings, and such with one kind of noise.
+    // Exact readings, and readings with one kind of noise.
     for name in ["drift_alone_percent", "noise_alone_percent", "neither_percent"] {
         assert!((0.0..100.0).contains(&plan[name].as_f64().unwrap()), "{name}: {json}");
     }
@@ -187,7 +188,7 @@ fn a_plan_says_what_recordings_tell_and_what_sampling_leaves() {
     assert!(illustrative.contains("an illustrative sensor (ecoflex-00-30)"), "{illustrative}");
 }
 
-/// A board that starts again, with its header or without, starts the filters of all joints again.
+/// A board that restarts, with its header or without, restarts the filters of all joints.
 #[test]
 fn filters_of_all_joints_start_again_with_the_clock() {
     let bench = Bench::calibrated();
@@ -201,7 +202,7 @@ fn filters_of_all_joints_start_again_with_the_clock() {
     let header = "time_s,a,b\n";
     let hand = ["hand", "hand.toml", "--skip-bad"];
     let alone = |rows: &str| bench.feed(&hand, format!("{header}{rows}")).ok();
-    // Two rows tell that the clock has started again, the third is the first that counts.
+    // Two rows show that the clock has restarted; the third is the first that counts.
     for (between, rest) in [("", rows(2)), (header, rows(0))] {
         let run = bench.feed(&hand, format!("{header}{}{between}{}", rows(0), rows(0)));
         assert!(run.warnings.concat().contains("the clock has started again"), "{:?}", run.warnings);

@@ -1,4 +1,4 @@
-//! Readings that are none: overloads, unplugged and stuck sensors. No reading ends a run.
+//! Invalid readings: overloads, unplugged and stuck sensors. No reading ends a run.
 
 use crate::common::{Bench, Csv, change_rows};
 
@@ -38,7 +38,8 @@ fn an_overload_is_a_missing_reading() {
     }
 }
 
-/// Readings that a gate rejects for two seconds end no run, and half a minute later the estimate is what it would have been.
+/// Readings that a gate rejects for two seconds do not end a run, and half a minute later the estimate is as it would have
+/// been.
 #[test]
 fn an_unplugged_sensor_is_found_again() {
     let bench = Bench::calibrated();
@@ -56,8 +57,8 @@ fn an_unplugged_sensor_is_found_again() {
     }
 }
 
-/// A reading that stands still to the last digit says nothing after a while: it is flagged, and what is known of the strain
-/// fades as it does without readings.
+/// A reading that does not change in any digit is ignored after a while: it is flagged, and the strain becomes as uncertain as
+/// without readings.
 #[test]
 fn a_stuck_reading_is_flagged_and_not_believed() {
     let bench = Bench::calibrated();

@@ -1,5 +1,5 @@
-//! Whatever `inspect --suggest` suggests, a shell runs, `import` accepts, and the trace has the numbers that the file was
-//! made of.
+//! For random files, a shell runs the suggestion of `inspect --suggest`, `import` accepts it, and the trace contains the file's
+//! numbers.
 
 use std::process::Command;
 
@@ -8,7 +8,7 @@ use assert_cmd::cargo::cargo_bin;
 use proptest::prelude::*;
 use proptest::sample::select;
 
-/// A unit by the spelling in the file, and by how many powers of ten its numbers are larger than the trace's.
+/// A unit: its spelling in the file, and the power of ten by which its numbers exceed the trace's.
 type Unit = (&'static str, i32);
 
 /// Form of a file.
@@ -38,7 +38,7 @@ enum Encoding {
     Latin1,
 }
 
-/// A row: microseconds, milliohms (none where the instrument is overloaded), millionths of strain.
+/// A row: microseconds, milliohms (`None` for an overload), millionths of strain.
 type Row = (i64, Option<i64>, i64);
 
 fn rows() -> impl Strategy<Value = Vec<Row>> {
@@ -91,7 +91,7 @@ fn form() -> impl Strategy<Value = Form> {
     })
 }
 
-/// A whole number of 10^-`digits` in a unit that is 10^`shift` times smaller, exactly.
+/// Formats a whole number of 10^-`digits` in a unit that is 10^`shift` times smaller, exactly.
 fn decimal(value: i64, digits: i32, shift: i32, comma: bool) -> String {
     let digits = digits - shift;
     let sign = if value < 0 { "-" } else { "" };
@@ -140,7 +140,7 @@ impl Form {
     }
 }
 
-/// Runs the program and then what it suggests; what was said where that fails.
+/// Runs the program and then its suggestion; returns the messages if that fails.
 fn import(bench: &Bench, file: &str) -> Result<Csv, String> {
     let folder = cargo_bin("ohmstrain").parent().unwrap().to_path_buf();
     let path = format!("{}:{}", folder.display(), std::env::var("PATH").unwrap());
@@ -158,7 +158,7 @@ fn import(bench: &Bench, file: &str) -> Result<Csv, String> {
         return Err(format!("{line}{}", String::from_utf8_lossy(&run.stderr)));
     }
     let output = line.trim_end().rsplit_once(' ').unwrap().1;
-    // The import has to be a trace again, to every command's reader.
+    // Every command must read the import as a trace.
     let again = shell("ohmstrain", &["import", output]);
     let text = bench.read(output);
     let rows = |text: &str| text.lines().filter(|line| !line.starts_with('#')).map(str::to_owned).collect::<Vec<_>>();
@@ -179,7 +179,7 @@ proptest! {
             Ok(trace) => trace,
             Err(error) => return Err(TestCaseError::fail(error)),
         };
-        // Powers of ten are not multiplied with but move the decimal mark: each number is rounded once, as here.
+        // Powers of ten move the decimal mark instead of being multiplied, so that each number is rounded once, as here.
         let time: Vec<f64> = rows.iter().map(|(time, ..)| *time as f64 / 1e6).collect();
         let strain: Vec<f64> = rows.iter().map(|(.., strain)| *strain as f64 / 1e6).collect();
         let reading: Vec<f64> = rows.iter().map(|(_, reading, _)| reading.map_or(f64::NAN, |it| it as f64 / 1e3)).collect();

@@ -1,4 +1,4 @@
-//! Files that a stopped command leaves behind.
+//! Files left behind by an interrupted command.
 #![cfg(unix)]
 
 use std::io::{BufRead, BufReader, Write};
@@ -8,10 +8,10 @@ use std::time::{Duration, Instant};
 use crate::common::{Bench, files_in};
 use assert_cmd::cargo::cargo_bin;
 
-/// Longer than anything takes on a busy machine.
+/// Longer than any operation takes on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// A filter of a pipe that writes Parquet, which is whole with its last row only: it has begun, and waits for more.
+/// Starts a filter of a pipe that writes Parquet, which is complete only with its last row: it has begun, and waits for more.
 fn waiting(bench: &Bench) -> (Child, ChildStdin) {
     let mut command = Command::new(cargo_bin!("ohmstrain"));
     command.current_dir(bench.path("")).args(["filter", "-", "--sensor", "sensor.toml", "-o", "out/estimates.parquet"]);
@@ -38,7 +38,7 @@ fn stop(child: &mut Child, signal: &str) -> std::process::ExitStatus {
         if let Some(status) = child.try_wait().unwrap() {
             return status;
         }
-        // A shell that starts these tests in the background has them ignore interrupts, and the program with them.
+        // A shell that starts these tests in the background makes them and the program ignore interrupts.
         assert!(started.elapsed() < PATIENCE, "{signal} was ignored");
         std::thread::sleep(Duration::from_millis(20));
     }
@@ -64,7 +64,7 @@ fn a_signal_leaves_the_old_file_and_no_other() {
     }
 }
 
-/// The next run clears away the files of a killed one; files of a process that still runs stay.
+/// The next run removes the files of a killed one; files of a running process stay.
 #[test]
 fn what_a_killed_run_left_goes_with_the_next_one() {
     let bench = bench();
@@ -76,14 +76,14 @@ fn what_a_killed_run_left_goes_with_the_next_one() {
     std::fs::create_dir(bench.path("out/.ohmstrain-a1B2c3.parts")).unwrap();
     bench.write("out/.ohmstrain-notes", "mine");
     bench.run(&["filter", "trace.csv", "--sensor", "sensor.toml", "-o", "out/new.csv"]).ok();
-    // One is at work, and one is no output.
+    // One file is in use, and one is not an output.
     assert_eq!(left(&bench), 2, "{:?}", files_in(&bench.path("out")));
     drop(stdin);
     assert!(other.wait_with_output().unwrap().status.success());
     assert_eq!(files_in(&bench.path("out")), [".ohmstrain-notes", "estimates.parquet", "new.csv"]);
 }
 
-/// A signal that whoever starts the program has it ignore is ignored.
+/// A signal that the parent process has set to be ignored is ignored.
 #[cfg(target_os = "linux")]
 #[test]
 fn an_ignored_interrupt_stays_ignored() {

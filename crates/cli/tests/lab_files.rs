@@ -1,4 +1,4 @@
-//! `inspect` and `import` as a shell runs them.
+//! `inspect` and `import` as run by a shell.
 
 use std::fmt::Write as _;
 use std::process::Command;
@@ -6,7 +6,7 @@ use std::process::Command;
 use crate::common::{Bench, Csv, SIMULATE};
 use assert_cmd::cargo::cargo_bin;
 
-/// Runs a line of shell in the bench's folder, with the program on its path; what was printed.
+/// Runs a shell command in the bench's folder, with the program on its path; returns exit code and output.
 #[track_caller]
 fn shell(bench: &Bench, line: &str) -> (Option<i32>, String, String) {
     let folder = cargo_bin("ohmstrain").parent().unwrap().to_path_buf();
@@ -159,7 +159,7 @@ fn a_file_that_is_no_trace_is_sent_to_inspect() {
     assert!(run.code == Some(4) && !run.stderr.contains("inspect"), "{}", run.stderr);
 }
 
-/// The remarks name each column's role once, with every word that was taken for a missing value.
+/// The remarks name each column's role once, with every word taken for a missing value.
 #[test]
 fn remarks_name_every_missing_word_and_come_once() {
     let bench = Bench::new();
@@ -236,7 +236,7 @@ fn joints_of_one_file_are_imported_and_calibrated_together() {
         trace.contains("\ntime_s,thumb_ohm,index_ohm,thumb_angle_deg,index_angle_deg\n0,12000,14000,0,0\n"),
         "{trace}"
     );
-    // What is imported again may be replaced.
+    // The output of an earlier import may be replaced.
     let (code, _, said) = shell(&bench, &command);
     assert!(code == Some(0), "{said}");
 }

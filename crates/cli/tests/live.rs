@@ -1,4 +1,4 @@
-//! `live` in a terminal of its own, on a serial port that is the other end of a pseudo-terminal.
+//! `live` in a terminal of its own, with a serial port that is the other end of a pseudo-terminal.
 #![cfg(unix)]
 
 use std::io::Write;
@@ -11,7 +11,7 @@ use crate::common::terminal::{Port, Terminal};
 use crate::common::{Bench, Csv};
 use assert_cmd::cargo::cargo_bin;
 
-/// `live` with the bench's sensor.
+/// Starts `live` with the bench's sensor.
 fn live(bench: &Bench, port: &str, more: &[&str]) -> Terminal {
     let arguments = [&["live", "--port", port, "--sensor", "sensor.toml"], more].concat();
     Terminal::new(bench, cargo_bin!("ohmstrain"), &arguments)
@@ -20,11 +20,11 @@ fn live(bench: &Bench, port: &str, more: &[&str]) -> Terminal {
 /// Returns the terminal's line for a row of `filter`.
 fn shown(estimates: &Csv, row: usize) -> String {
     let number = |column: &str| estimates.numbers(column)[row];
-    // 1.96 standard deviations, in percent, as the terminal's two digits have them.
+    // 1.96 standard deviations, in percent, with the terminal's two digits.
     format!("{:.2} ± {:.2} %", 100.0 * number("strain"), 100.0 * 1.96 * number("strain_sd"))
 }
 
-/// Rows at 5 Hz as a device sends them.
+/// Returns a row at 5 Hz as a device sends it.
 fn sent(row: u32) -> String {
     format!("{:.1},{}\n", 0.2 * f64::from(row), 1600 + row % 7)
 }
@@ -37,7 +37,7 @@ fn lines_come_by_udp() {
     let live = Terminal::new(&bench, cargo_bin!("ohmstrain"), &header);
     live.wait_for(&format!("udp {free}"));
     let device = UdpSocket::bind("127.0.0.1:0").unwrap();
-    // Two lines in a datagram, one without its end, and one that is none.
+    // Two lines in a datagram, one without its end, and an invalid one.
     for text in [sent(0) + &sent(1), sent(2).trim().to_owned(), "garbage\n".to_owned(), sent(3)] {
         device.send_to(text.as_bytes(), &free).unwrap();
         thread::sleep(Duration::from_millis(5));
@@ -59,7 +59,7 @@ fn lines_come_by_tcp_from_one_device_after_the_other() {
         let text: String = part.clone().map(sent).collect();
         stream.write_all(text.as_bytes()).unwrap();
         live.wait_for(&(1600 + part.end - 1).to_string());
-        // It goes away, and another one comes.
+        // The sender disconnects, and another one connects.
         drop(stream);
     }
     assert!(live.quit().contains("6 rows, 0 readings missing"));
@@ -81,7 +81,7 @@ fn lines_from_a_port_are_filtered_at_real_speed_and_faster() {
     let terminal = live(&bench, "port", &[]);
     terminal.wait_for("connected");
     port.send(&(lines[..head].join("\r\n") + "\r\n"));
-    // Five readings per second, as the recording has them.
+    // Five readings per second, as in the recording.
     for line in &lines[head..head + 10] {
         port.send(&format!("{line}\r\n"));
         thread::sleep(Duration::from_millis(200));
@@ -106,7 +106,7 @@ fn garbage_resizing_and_unplugging_stop_nothing() {
     terminal.wait_for("waiting for the port");
     let mut port = Port::plug_in(&port_path);
     terminal.wait_for("connected");
-    // The middle of a line, as a port that is joined late gives it; then a good one, and what interference makes of others.
+    // The rest of a line, as after opening a port late; then a good line, and lines damaged by interference.
     port.send("00,16");
     port.send("\n1.0,1600\n\u{fffd}\u{1}\"\n1.2,16x0\n1.2,1601,7\n");
     port.device.write_all(&[0xff, 0xfe, b'\n', b'1', b'.', b'2', b',', b'\n', b'1', b'.', b'4', b',']).unwrap();
@@ -114,7 +114,7 @@ fn garbage_resizing_and_unplugging_stop_nothing() {
     terminal.wait_for("1 missing, 0 gaps");
     // `00,16` is a row by chance: 16 ohms at 0 s, which the sensor cannot read.
     terminal.wait_for("4 lines");
-    // A line that does not end is one, and what stands at its end is no row.
+    // An endless line counts as one, and its end is not a row.
     for part in ["9".repeat(8192), "9".repeat(4000)] {
         port.send(&part);
         thread::sleep(Duration::from_millis(50));
@@ -136,7 +136,7 @@ fn garbage_resizing_and_unplugging_stop_nothing() {
     terminal.wait_for("waiting for the port");
     let mut port = Port::plug_in(&port_path);
     terminal.wait_for("connected");
-    // The device has been reset: its clock starts again, which three lines are needed to be sure of.
+    // The device has been reset: its clock restarts, which three lines confirm.
     port.send("0.2,1600\n0.4,1600\n0.6,1600\n0.8,1601\n1.0,1601\n");
     terminal.wait_for("the clock has started again");
     let left = terminal.quit();
@@ -157,7 +157,7 @@ fn a_recording_is_played_back_recorded_marked_and_zeroed() {
     terminal.wait_for("it starts again at zero");
     terminal.press("r");
     terminal.wait_for("recorded live-1.csv (");
-    // Whatever ends the program, what was recorded has whole rows.
+    // However the program ends, the record has whole rows.
     terminal.press("r");
     terminal.wait_for("recording to live-2.csv");
     terminal.wait_for("record     1");
@@ -191,13 +191,13 @@ fn readings_on_stdin_leave_the_keys_to_the_terminal() {
         format!("'{}' live --port - --header resistance_ohm --sensor sensor.toml < readings.txt", program.display());
     let terminal = Terminal::new(&bench, Path::new("/bin/sh"), &["-c", &line]);
     terminal.wait_for("the readings have ended");
-    // All arrive at once, and none is lost.
+    // All lines arrive at once, and none is lost.
     terminal.wait_for("drop-outs");
     let left = terminal.quit();
     assert!(left.contains("30 rows, 0 readings missing, 0 gaps, 0 lines skipped"), "{left}");
 }
 
-/// The keys are of the view: readings cannot come from the keyboard.
+/// The keyboard belongs to the view, so readings cannot come from it.
 #[test]
 fn the_keyboard_is_no_port() {
     let bench = Bench::calibrated();

@@ -1,5 +1,5 @@
-//! The program as a whole: what it prints, writes and exits with. One test program, which is linked once and shares what was
-//! calibrated; a module for each subject.
+//! The program as a whole: its output, files and exit codes. A single test program, which is linked once and shares
+//! calibrations; one module per subject.
 
 mod common;
 

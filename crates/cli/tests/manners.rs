@@ -1,4 +1,4 @@
-//! Manners of the program: help, hints, the amount of messages, completions and manuals.
+//! Behaviour towards users: help, hints, verbosity, completions and manuals.
 
 use crate::common::{Bench, SIMULATE, files_in};
 
@@ -112,7 +112,7 @@ fn shells_and_manuals_know_every_command() {
     }
 }
 
-/// A movement at random noise is no law's.
+/// No law describes a movement with random readings.
 #[test]
 fn fits_that_say_little_are_warned_of_and_tables_have_units() {
     let bench = Bench::new();
@@ -130,7 +130,7 @@ fn fits_that_say_little_are_warned_of_and_tables_have_units() {
     let run = bench.run(&["fit-law", "--compare", "kww,prony:1", "--segment", "whole", "noise.csv"]);
     let of_law = |law: &str| run.warnings.iter().any(|w| w.contains(&format!("{law}: whole: R^2 is ")));
     assert!(of_law("kww") && of_law("prony:1"), "{:?}", run.warnings);
-    // Where many are poor they are counted.
+    // Poor fits are counted if there are many.
     let triangle = |k: usize| (k % 20).min(20 - k % 20) as f64 / 50.0;
     let rows: String = (0..400).map(|k| format!("{}.{},{},{}\n", k / 10, k % 10, noise(k), triangle(k))).collect();
     bench.write("many.csv", format!("time_s,resistance_ohm,strain\n{rows}"));
@@ -139,7 +139,7 @@ fn fits_that_say_little_are_warned_of_and_tables_have_units() {
     assert!(run.warnings.iter().any(|warning| warning.contains("R^2 is below 0.9 in ")), "{:?}", run.warnings);
 }
 
-/// A table of numbers that is broken by the terminal cannot be read.
+/// A table of numbers is unreadable if the terminal wraps it.
 #[test]
 fn no_table_and_no_help_is_wider_than_a_hundred_columns() {
     let bench = Bench::calibrated();
@@ -147,7 +147,7 @@ fn no_table_and_no_help_is_wider_than_a_hundred_columns() {
     let narrow = |arguments: &[&str]| {
         let run = bench.run(arguments);
         assert_eq!(run.code, Some(0), "{}: {}", run.command, run.stderr);
-        // clap does not break the line of usage.
+        // clap does not wrap the line of usage.
         for line in run.stdout.lines().filter(|line| !line.starts_with("Usage: ")) {
             assert!(line.chars().count() <= 100, "{}: {line}", run.command);
         }
@@ -164,7 +164,7 @@ fn no_table_and_no_help_is_wider_than_a_hundred_columns() {
     }
 }
 
-/// One name was all that an error said, and not what it is about.
+/// Errors once contained only a name, without the kind of the file.
 #[test]
 fn what_a_file_is_and_what_is_missing_is_said() {
     let bench = Bench::calibrated();
@@ -210,7 +210,7 @@ fn what_a_file_is_and_what_is_missing_is_said() {
     let inspected = bench.run(&["inspect", "trace.csv"]).ok();
     let next = "it is a trace already and needs no import; go on with\nohmstrain calibrate trace.csv -o sensor.toml\n";
     assert!(inspected.ends_with(next), "{inspected}");
-    // Strain in percent that nobody says is in percent is none yet.
+    // Strain in percent is not accepted as strain until the user confirms the unit.
     let percent = bench.read("trace.csv").replace("strain\n", "strain (%)\n");
     bench.write("percent.csv", percent);
     assert!(bench.run(&["inspect", "percent.csv"]).ok().contains("import it with"));

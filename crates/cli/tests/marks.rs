@@ -1,4 +1,4 @@
-//! `calibrate --marks`: strains that are known at marks, in place of a reference.
+//! `calibrate --marks`: strains known at marks, in place of a reference.
 
 use crate::common::{Bench, Csv};
 
@@ -11,7 +11,7 @@ fn without_reference(bench: &Bench) -> Csv {
     trace
 }
 
-/// Every largest and least strain of the recording that the way there is long enough for, as a person would note it.
+/// Returns the extreme strains of the recording that are far enough from the previous one, as a person would note them.
 fn turning_points(trace: &Csv) -> String {
     let (time_s, strain) = (trace.numbers("time_s"), trace.numbers("strain"));
     let span = strain.iter().fold(0.0, |most: f64, x| most.max(*x));

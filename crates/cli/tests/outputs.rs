@@ -1,4 +1,4 @@
-//! Files that commands write: what was there before is not lost, and a command that fails leaves everything as it was.
+//! Files that commands write: existing files are not lost, and a command that fails leaves everything as it was.
 
 use crate::common::{Bench, SIMULATE};
 
@@ -6,7 +6,7 @@ use crate::common::{Bench, SIMULATE};
 const ARGUMENTS: i32 = 2;
 const OTHER: i32 = 1;
 
-/// A calibration that takes no time.
+/// A quick calibration.
 const CALIBRATE: [&str; 7] = ["calibrate", "trace.csv", "--until", "60", "--estimator", "ekf", "-o"];
 const REFINE: [&str; 7] = ["refine", "trace.csv", "--sensor", "sensor.toml", "--until", "60", "-o"];
 const EXPORT: [&str; 8] = ["export", "--sensor", "sensor.toml", "--target", "rust", "--dt-s", "0.2", "-o"];
@@ -14,7 +14,7 @@ const EXPORT: [&str; 8] = ["export", "--sensor", "sensor.toml", "--target", "rus
 /// A recording of a user.
 const RECORDING: &str = "# material = silicone\ntime_s,resistance_ohm,strain\n0,1600,0\n0.1,1610,0.01\n";
 
-/// Runs a command that has to be refused, and looks after the files: all of them keep their contents, no new one appears.
+/// Runs a command that must be refused, and checks the files: all keep their contents, no new one appears.
 #[track_caller]
 fn refused(bench: &Bench, arguments: &[&str], code: i32, message: &str) {
     let contents = || -> Vec<_> {
@@ -49,7 +49,7 @@ fn a_file_of_another_kind_is_replaced_only_by_force() {
         (&REFINE, &["recording.csv"], foreign("recording.csv", "a sensor file")),
         (&EXPORT, &["."], foreign("./README.md", "an export")),
         (&["demo", "--out"], &["mine"], foreign("mine/trace.csv", "a simulated recording")),
-        // A sensor file is no report, though both are ours.
+        // A sensor file is not a report, though both are outputs of this program.
         (&CALIBRATE, &["new.toml", "--report", "sensor.toml"], foreign("sensor.toml", "a report")),
     ];
     for (command, flags, message) in &cases {
@@ -89,7 +89,7 @@ fn only_what_can_be_made_again_is_replaced() {
 #[test]
 fn what_this_program_wrote_is_replaced() {
     let bench = Bench::calibrated();
-    // An empty file, as mktemp makes it, holds nothing to lose.
+    // An empty file, as mktemp creates it, contains nothing to lose.
     bench.write("empty.csv", "");
     bench.run(&[&SIMULATE[..], &["-o", "empty.csv"]].concat()).ok();
     for _ in 0..2 {
@@ -124,7 +124,7 @@ fn an_input_or_another_output_is_not_replaced_whatever_it_is_called() {
     refused(&bench, &[&CALIBRATE[..], &["new.toml", "--report", "folder/../new.toml"]].concat(), ARGUMENTS, message);
 }
 
-/// The recording cannot be read either, and would be the first to be complained of if the output came later.
+/// The recording is unreadable, too, and would be reported first if the output were checked later.
 #[test]
 fn an_output_that_cannot_be_written_is_noticed_before_the_work() {
     let bench = Bench::calibrated();
@@ -139,7 +139,7 @@ fn an_output_that_cannot_be_written_is_noticed_before_the_work() {
     }
 }
 
-/// Folders that were made for outputs go again.
+/// Folders that were created for outputs are removed again.
 #[test]
 fn a_command_that_fails_leaves_no_folder_behind() {
     let bench = Bench::calibrated();
@@ -180,7 +180,7 @@ mod on_unix {
         assert!(fs::symlink_metadata(bench.path("null")).unwrap().is_symlink());
     }
 
-    /// The device fails when everything has been made.
+    /// The device fails after everything has been computed.
     #[test]
     fn an_output_that_fails_at_the_end_takes_the_others_with_it() {
         if !std::path::Path::new("/dev/full").exists() {

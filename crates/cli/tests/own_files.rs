@@ -1,4 +1,4 @@
-//! Files that the program takes for its own, and replaces: by whole headers and marks, not by a slight likeness.
+//! Recognition of the program's own files, which it replaces: by whole headers and marks, not by a slight likeness.
 
 use std::fs;
 
@@ -8,7 +8,7 @@ fn estimate<'a>(command: &'a str, output: &'a str) -> [&'a str; 6] {
     [command, "trace.csv", "--sensor", "sensor.toml", "-o", output]
 }
 
-/// Recordings with columns whose names begin as those of estimates do, or are some of these.
+/// A recording is not taken for estimates if its column names begin like those of estimates, or are some of them.
 #[test]
 fn a_recording_is_not_taken_for_estimates() {
     let bench = Bench::calibrated();
@@ -40,7 +40,7 @@ fn a_recording_is_not_taken_for_estimates() {
     bench.run(&estimate("filter", "mine.csv")).ok();
 }
 
-/// A table of this program that is none of estimates, in Parquet too.
+/// A table of this program that does not contain estimates, also in Parquet.
 #[test]
 fn a_summary_is_not_taken_for_estimates_nor_these_for_it() {
     let bench = Bench::calibrated();
@@ -52,7 +52,7 @@ fn a_summary_is_not_taken_for_estimates_nor_these_for_it() {
         let made = fs::read(bench.path(&summary)).unwrap();
         assert_eq!(bench.run(&estimate("smooth", &summary)).code, Some(2));
         bench.run(&batch).ok();
-        // Somebody else's of the same name stays.
+        // Another program's file of the same name stays.
         let estimates = format!("mine.{form}");
         bench.run(&estimate("smooth", &estimates)).ok();
         fs::rename(bench.path(&estimates), bench.path(&summary)).unwrap();
@@ -104,7 +104,7 @@ fn a_manifest_names_nothing_outside_of_the_folder() {
     assert!(!bench.path("out").exists());
     assert_eq!(batch("filter", "output", "./b.csv").code, Some(0));
     assert!(bench.path("out/b.csv").is_file());
-    // The names of the summary and the journal are taken.
+    // The names of the summary and the journal are reserved.
     assert!(batch("evaluate", "output", "summary.json").stderr.contains("name of the summary"));
     // One report of two recordings.
     let flags =
@@ -124,7 +124,7 @@ fn a_page_of_a_manual_is_replaced_if_it_is_ours() {
     bench.run(&["man", "-o", "man", "--force"]).ok();
 }
 
-/// Figures and exports are made again in their folder; what only speaks of this program stays.
+/// Figures and exports are replaced in their folder; files that only mention this program stay.
 #[test]
 fn figures_and_exports_are_known_by_their_marks() {
     let bench = Bench::calibrated();
@@ -179,7 +179,7 @@ mod on_unix {
     }
 }
 
-/// `-` is stdout where rows or a recording are printed, and nothing else anywhere.
+/// `-` means stdout where rows or a recording are printed, and is invalid elsewhere.
 #[test]
 fn no_file_is_called_like_stdout() {
     let bench = Bench::calibrated();

@@ -1,19 +1,19 @@
-//! Pipeline from a recording to a report: the program's promises when nothing is wrong.
+//! Pipeline from a recording to a report: the program's promises for good data.
 
 use std::fs;
 
 use crate::common::{Bench, CALIBRATED_UNTIL, Csv, ESTIMATES_HEADER, SIMULATE, files_in};
 use serde_json::Value;
 
-/// Share of the limits within which 95 % of a normal distribution lies.
+/// Quantile of the normal distribution: 95 % lie within ± this.
 const NORMAL_95: f64 = 1.959_963_984_540_054;
 
-/// The sensor is not the fitted law's own: release peaks, nine branches, play, memory.
+/// The sensor is outside the fitted family of laws: release peaks, nine branches, play, memory.
 ///
 /// Measured with seeds 1 to 12, RMSE in % of full scale, filter against static cubic, and coverage of the 95 % interval:
 /// 26.9/30.9 .94, 21.5/27.7 .94, 20.2/28.5 .99, 24.8/31.7 1.00, 26.8/35.4 .86, 25.1/28.4 .99, 22.1/29.5 1.00,
 /// 20.0/29.5 1.00, 26.2/25.8 .80, 17.9/25.4 1.00, 21.6/31.9 1.00, 29.5/37.0 .86: below the cubic in eleven of twelve.
-/// The first four stand for them.
+/// The first four represent them.
 #[test]
 fn the_chain_beats_the_static_inverse_on_a_sensor_outside_of_the_fitted_family() {
     for seed in ["1", "2", "3", "4"] {
@@ -49,7 +49,7 @@ fn the_demo_writes_five_whole_files_prints_its_table_and_does_the_same_twice() {
         assert_eq!(fs::read(first.path(&path)).unwrap(), fs::read(second.path(&path)).unwrap(), "{name}");
     }
 
-    // The example is its recording.
+    // `example` writes the demo's recording.
     assert_eq!(first.run(&["example"]).ok(), first.read("demo/trace.csv"));
 
     let trace = Csv::new(&first.read("demo/trace.csv"));
@@ -72,12 +72,12 @@ fn the_demo_writes_five_whole_files_prints_its_table_and_does_the_same_twice() {
     assert!(printed.ends_with("See demo/report.html\n"));
 }
 
-/// One file that needs no other: nothing in it makes a browser load something.
+/// Asserts that a page is self-contained: nothing in it makes a browser load anything.
 #[track_caller]
 fn assert_one_whole_page(page: &str) {
     assert!(page.starts_with("<!DOCTYPE html>") && page.trim_end().ends_with("</html>"));
     assert!(page.matches("<svg").count() >= 5);
-    // The name of a namespace, which nothing loads, and places on the page itself.
+    // The name of a namespace, which is not loaded, and targets within the page.
     let page = page.replace("http://www.w3.org/2000/svg", "").replace("url(#", "");
     for reference in ["http:", "https:", "src=", "href=\"/", "url(", "@import", "<script ", "<link", "<iframe"] {
         assert!(!page.contains(reference), "{reference}");
@@ -103,7 +103,7 @@ fn the_json_of_evaluate_has_the_fields_that_scripts_rely_on() {
     let names = ["commit", "made_by", "recordings", "schema", "simulated_seed", "summary"];
     assert_eq!(fields(&json), names);
     assert_eq!(json["recordings"].as_array().unwrap().len(), 2);
-    // In the order of the alphabet, as the parsed object has them.
+    // In alphabetical order, like the parsed object.
     let scores = [
         "bias",
         "coverage_50",
@@ -168,7 +168,7 @@ fn evaluate_scores_the_rows_from_t_of_a_filter_that_started_at_the_first() {
 #[test]
 fn evaluate_check_fails_with_its_own_code_and_still_prints() {
     let bench = Bench::calibrated();
-    // Noise a thousand times too small: an interval that covers nothing.
+    // With a thousandth of the noise, an interval covers nothing.
     let sensor = bench.read("sensor.toml");
     let noise = sensor.find("[estimators.ekf.noise]").unwrap();
     let overconfident = change_numbers(&sensor[noise..], &["branch_sd", "baseline_sd", "reading_sd"], 1e-3);
@@ -180,7 +180,7 @@ fn evaluate_check_fails_with_its_own_code_and_still_prints() {
     assert!(run.stdout.contains("static cubic"));
 }
 
-/// Multiplies the numbers of some keys.
+/// Multiplies the numbers under some keys.
 fn change_numbers(toml: &str, keys: &[&str], factor: f64) -> String {
     let change = |line: &str| match line.split_once(" = ") {
         Some((key, value)) if keys.contains(&key) => format!("{key} = {:e}\n", factor * value.parse::<f64>().unwrap()),
@@ -193,7 +193,7 @@ fn change_numbers(toml: &str, keys: &[&str], factor: f64) -> String {
 fn calibrate_uses_the_rows_before_until_and_those_at_and_after_from() {
     let bench = Bench::calibrated();
     let trace = bench.read("trace.csv");
-    // The boundaries are times of rows: the one belongs to the rows left out, the other to the rows used.
+    // The limits are times of rows: the lower one belongs to the rows used, the upper one to the held-out rows.
     let (from, until) = (20.2, 99.8);
     assert_eq!(Csv::new(&trace).cells("time_s")[101], "20.2");
     assert_eq!(Csv::new(&trace).cells("time_s")[499], "99.8");
@@ -206,7 +206,7 @@ fn calibrate_uses_the_rows_before_until_and_those_at_and_after_from() {
     let flags = ["calibrate", "trace.csv", "--from", "20.2", "--until", "99.8", "-o", "flags.toml"];
     bench.run(&[&flags[..], &branches].concat()).ok();
     bench.run(&[&["calibrate", "cut.csv", "-o", "cut.toml"], &branches[..]].concat()).ok();
-    // The rows that flags kept from the calibration are tested on; a file without them has none.
+    // The held-out rows are tested; a file without them has no test.
     let without_origin = |name: &str| -> toml::Table {
         let mut sensor: toml::Table = toml::from_str(&bench.read(name)).unwrap();
         assert_eq!(sensor.remove("tested").is_some(), name == "flags.toml");

@@ -1,15 +1,15 @@
-//! `record`: a person follows a protocol, the strain is known where the body is held, and `calibrate` takes that.
+//! `record`: a person follows a protocol, the strain is known while the body is held, and `calibrate` accepts that.
 
 use crate::common::{Bench, Csv};
 
-/// A protocol of four minutes between three positions.
+/// Returns a folder with a protocol of four minutes between three positions.
 fn planned() -> Bench {
     let bench = Bench::new();
     bench.run(&["plan", "--strains", "rest=0 half=0.15 full=0.3", "-o", "protocol.toml"]).ok();
     bench
 }
 
-/// A simulated board beside a person who follows the bench's protocol.
+/// Simulates a board beside a person who follows the bench's protocol.
 fn board(bench: &Bench, name: &str, more: &[&str]) {
     let simulate = ["simulate", "--follow", "protocol.toml", "--material", "representative", "--mismatched"];
     bench.run(&[&simulate[..], &["--sample-rate-hz", "10", "-o", name], more].concat()).ok();
@@ -20,12 +20,12 @@ fn record(bench: &Bench, port: &str, more: &[&str]) -> crate::common::Run {
     bench.run(&[&flags[..], more].concat())
 }
 
-/// Numbers of a column; NaN where a cell is empty.
+/// Returns the numbers of a column; NaN for empty cells.
 fn numbers(trace: &Csv, column: &str) -> Vec<f64> {
     trace.cells(column).iter().map(|cell| if cell.is_empty() { f64::NAN } else { cell.parse().unwrap() }).collect()
 }
 
-/// Root mean square of the differences, percent of a range.
+/// Returns the root mean square of the differences, percent of a range.
 fn percent(estimate: &[f64], truth: &[f64], range: f64) -> f64 {
     let squares: f64 = estimate.iter().zip(truth).map(|(a, b)| (a - b).powi(2)).sum();
     100.0 * (squares / truth.len() as f64).sqrt() / range
@@ -48,8 +48,9 @@ fn holds_of_a_person_calibrate_a_sensor() {
     assert_eq!(trace.cells("resistance_ohm"), truth.cells("resistance_ohm")[..rows]);
     let (stated, truth) = (numbers(&trace, "strain"), truth.numbers("strain"));
     let known: Vec<usize> = (0..rows).filter(|row| stated[*row].is_finite()).collect();
-    // Most of the holds; and there the body is where it should be, within three deviations of how well positions are kept: but for a
-    // slow move of 3 s that takes a quarter longer and begins 0.6 s late, and so ends 0.35 s after the first second of the hold.
+    // Most of the holds are known; there the body is at its position within three deviations of a person's accuracy. The
+    // exception is a slow move of 3 s that takes a quarter longer and begins 0.6 s late, and so ends 0.35 s after the first
+    // second of the hold.
     assert!((0.5..0.9).contains(&(known.len() as f64 / rows as f64)), "{} of {rows}", known.len());
     let far = known.iter().filter(|row| (stated[**row] - truth[**row]).abs() > 3.0 * 0.006).count();
     assert!(far * 20 < known.len(), "{far} of {}", known.len());
@@ -58,8 +59,8 @@ fn holds_of_a_person_calibrate_a_sensor() {
     assert!(shown.contains("needs no import; go on with\nohmstrain calibrate trace.csv -o sensor.toml"), "{shown}");
     let run = bench.run(&["calibrate", "trace.csv", "--estimator", "ekf", "-o", "sensor.toml"]);
     assert!(run.code == Some(0) && run.stderr.contains("trace.csv: 27 marks, held at 27; "), "{}", run.stderr);
-    // On another day of the same person the sensor is not twice as wrong as one that was calibrated on all of the true strain, and
-    // knows how wrong it is.
+    // On another day of the same person, the error is less than twice that of a sensor calibrated on the complete true strain,
+    // and the interval is right.
     bench.run(&["calibrate", "board.csv", "--estimator", "ekf", "-o", "stage.toml"]).ok();
     let again = Csv::new(&bench.read("again.csv")).numbers("strain");
     let estimates = |sensor: &str| Csv::new(&bench.run(&["filter", "again.csv", "--sensor", sensor]).ok());
@@ -166,7 +167,7 @@ fn readings_that_end_early_are_kept() {
     assert!(run.warnings[0].contains("the protocol was left with 26 steps to be made"), "{:?}", run.warnings);
     let header = text.lines().position(|line| line.starts_with("time_s")).unwrap();
     assert_eq!(Csv::new(&bench.read("trace.csv")).len(), 299 - header);
-    // A stream without a header is named, and so is how to give it one.
+    // For a stream without a header, the message names the way to supply one.
     bench.write("board.csv", "0,1600\n0.1,1601\n");
     let run = record(&bench, "board.csv", &["--force"]);
     assert!(run.code == Some(4) && run.stderr.contains("no reading came"), "{}", run.stderr);
@@ -181,7 +182,7 @@ mod on_a_terminal {
     use crate::common::terminal::{Port, Terminal};
     use assert_cmd::cargo::cargo_bin;
 
-    /// A protocol of three steps: rest 5 s, to B in 2 s for 8 s, back in 2 s for 5 s.
+    /// Returns a folder with a protocol of three steps: rest 5 s, to B in 2 s for 8 s, back in 2 s for 5 s.
     fn short() -> Bench {
         let bench = Bench::new();
         let text = "format = 1\n[[positions]]\nname = \"rest\"\nstrain = 0\n[[positions]]\nname = \"B\"\nstrain = 0.2\n\
@@ -196,12 +197,12 @@ mod on_a_terminal {
         Terminal::new(bench, cargo_bin!("ohmstrain"), &flags)
     }
 
-    /// Rows at 10 Hz from a time on, as fast as they go.
+    /// Returns rows at 10 Hz from a time on.
     fn rows(from: u32, until: u32) -> String {
         (from..until).map(|row| format!("{}.{},{}\n", row / 10, row % 10, 1600 + row % 7)).collect()
     }
 
-    /// Times with a strain, and the strain.
+    /// Returns the times with a strain, and the strain.
     fn known(bench: &Bench) -> Vec<(f64, f64)> {
         let trace = Csv::new(&bench.read("trace.csv"));
         let pairs = trace.numbers("time_s").into_iter().zip(numbers(&trace, "strain"));
@@ -225,7 +226,7 @@ mod on_a_terminal {
         terminal.wait_for("to rest in 2 s");
         terminal.wait_for("spoiled: the step is made again");
         assert!(known(&bench).iter().all(|(_, strain)| *strain == 0.0));
-        // Back in 2 s, 3 s there, then the step again, and the last one.
+        // Back in 2 s, 3 s there, then the repeated step, and the last one.
         port.send(&rows(120, 175));
         terminal.wait_for("to B in 2 s");
         port.send(&rows(175, 350));
@@ -251,7 +252,7 @@ mod on_a_terminal {
         terminal.wait_for("waiting for the port");
         let mut port = Port::plug_in(&bench.path("port"));
         terminal.wait_for("connected");
-        // The device has started anew: its clock begins again, and the step was spoiled.
+        // The device has restarted: its clock restarts, and the step was spoiled.
         port.send("time_s,resistance_ohm\n");
         port.send(&rows(0, 10));
         terminal.wait_for("the device has started anew: the step is made again");

@@ -1,4 +1,4 @@
-//! `refine`: the noise of readings found again from a start that is off, and what it refuses.
+//! `refine`: the noise of readings is recovered from a wrong start; and refusals.
 
 use std::fmt::Write;
 
@@ -19,7 +19,7 @@ const TRUE_NOISE: NoiseParams =
 const TRUE_MOTION: MotionParams =
     MotionParams { rate_time_s: 0.5, rate_sd_per_s: 0.2, strain_mean: 0.15, strain_sd: 0.08 };
 
-/// A linear law that is the same in both directions: the filter is exact on it, and so is the likelihood.
+/// Returns a linear law that is the same in both directions, for which the filter and its likelihood are exact.
 fn linear_law() -> LawParams {
     LawParams {
         extend_viscosity_s: 0.02,
@@ -40,7 +40,7 @@ fn branch(tau_s: f64, gains: [f64; 2], slopes: [f64; 2]) -> BranchParams {
     }
 }
 
-/// A recording drawn from the model itself, without a reference.
+/// Draws a recording from the model itself, without a reference.
 fn drawn(rows: usize) -> String {
     let MotionParams { rate_time_s, rate_sd_per_s, strain_mean, strain_sd } = TRUE_MOTION;
     let motion = Motion::ornstein_uhlenbeck(rate_time_s, rate_sd_per_s, strain_mean, strain_sd).unwrap();
@@ -59,7 +59,7 @@ fn drawn(rows: usize) -> String {
         let relative = observation.value + observation.variance.sqrt() * normal();
         writeln!(text, "{},{}", row as f64 * STEP_S, REST_OHM * (1.0 + relative)).unwrap();
         let transition: Transition<f64, 4, 10> = model.transition(&step, &state, direction);
-        // Strain, rate and the branch, which does not wander, move in two directions only, hence a root by eigenvalues.
+        // The noise of strain, rate and the branch, which does not wander, has rank two, hence a root by eigenvalues.
         let eigen = transition.noise.to_matrix().symmetric_eigen();
         state = transition.mean;
         for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
@@ -86,13 +86,13 @@ fn ekf_noise(params: &SensorParams) -> NoiseParams {
     params.estimators[&EstimatorKind::Ekf].noise
 }
 
-/// Cells of a parameter's row in the table.
+/// Returns the cells of a parameter's row in the table.
 fn row<'a>(printed: &'a str, parameter: &str) -> Vec<&'a str> {
     let line = printed.lines().find(|line| line.contains(&format!("| {parameter} "))).unwrap();
     line.trim_matches('|').split('|').map(str::trim).collect()
 }
 
-/// Log-likelihood before and after.
+/// Returns the log-likelihood before and after.
 fn log_likelihoods(printed: &str) -> [f64; 2] {
     let line = printed.lines().find(|line| line.starts_with("log-likelihood")).unwrap();
     let (_, numbers) = line.split_once(": ").unwrap();
@@ -100,7 +100,7 @@ fn log_likelihoods(printed: &str) -> [f64; 2] {
     [before, after].map(|text| text.split(' ').next().unwrap().parse().unwrap())
 }
 
-/// Success; standard output.
+/// Asserts success, and returns stdout.
 #[track_caller]
 fn done(run: &Run) -> &str {
     assert_eq!(run.code, Some(0), "{}", run.stderr);
@@ -134,8 +134,8 @@ fn the_noise_that_was_drawn_is_found_from_a_start_three_times_off() {
     for (name, truth) in [("reading_sd", 1e-2), ("rate_sd_per_s", 0.2)] {
         let cells = row(printed, name);
         let (found, error): (f64, f64) = (cells[2].parse().unwrap(), cells[3].parse().unwrap());
-        // The model is the one that was drawn from: the logarithm is normal around the truth, and four standard errors
-        // hold all but 6e-5 of the draws.
+        // The data are drawn from the model, so that the logarithm is normal around the truth; four standard errors contain all
+        // but 6e-5 of the draws.
         assert!((found / truth).ln().abs() <= 4.0 * error, "{printed}");
         let (lower, upper) = cells[4].split_once(" to ").unwrap();
         let (lower, upper): (f64, f64) = (lower.parse().unwrap(), upper.parse().unwrap());
@@ -143,7 +143,7 @@ fn the_noise_that_was_drawn_is_found_from_a_start_three_times_off() {
     }
     assert!(printed.contains("held: branch_sd\n"), "{printed}");
 
-    // Nothing else has changed, and the file says what the table says.
+    // Nothing else has changed, and the file agrees with the table.
     let (mut expected, refined) = (read_sensor(&bench, "start.toml"), read_sensor(&bench, "refined.toml"));
     let ekf = expected.estimators.get_mut(&EstimatorKind::Ekf).unwrap();
     let found = refined.estimators[&EstimatorKind::Ekf];
@@ -153,7 +153,7 @@ fn the_noise_that_was_drawn_is_found_from_a_start_three_times_off() {
     assert_eq!(expected, refined);
     assert_eq!(row(printed, "reading_sd")[2], format!("{:.4e}", found.noise.reading_sd));
 
-    // It starts where it ended the last time: the maximum stays where it is.
+    // A search from the last result stays at that maximum.
     let again = ["refine", "drawn.csv", "--sensor", "refined.toml", "-o", "again.toml"];
     let run = bench.run(&again);
     let [start, end] = log_likelihoods(done(&run));
@@ -163,7 +163,7 @@ fn the_noise_that_was_drawn_is_found_from_a_start_three_times_off() {
     assert!((moved - 1.0).abs() < 1e-6, "{moved}");
 }
 
-/// The law of the simulator's `ecoflex-00-30`, `matched.rs`.
+/// Returns the law of the simulator's `ecoflex-00-30`, `matched.rs`.
 fn matched_law() -> LawParams {
     LawParams {
         extend_viscosity_s: 0.02,
@@ -201,8 +201,8 @@ fn the_white_noise_of_the_bench_comes_nearer_though_the_bench_does_not_move_as_t
     assert_eq!(run.stderr, "ohmstrain: drawn.csv:8: the reference in `strain` is not used; calibrate would use it\n");
     let [before, after] = log_likelihoods(printed);
     assert!(after > before, "{printed}");
-    // Ramps and holds are not the motion of the model, nor is a filter of one Gaussian exact on a law of two directions:
-    // standard errors, which trust both, do not reach to the truth. Nearer than the start it must be.
+    // Ramps and holds are not the motion of the model, and a filter of one Gaussian is not exact for a law of two directions.
+    // Standard errors assume both, and do not reach the truth; the result must be nearer to it than the start.
     let found: f64 = row(printed, "reading_sd")[2].parse().unwrap();
     assert!((found / WHITE_SD).ln().abs() < 3_f64.ln(), "{printed}");
 }
@@ -218,7 +218,7 @@ fn the_same_input_gives_the_same_output_and_only_readings_count() {
     };
     let first = refine("trace.csv", "first.toml");
     assert_eq!(first, refine("trace.csv", "second.toml"));
-    // A reference that is not there changes nothing.
+    // A missing reference changes nothing.
     bench.write("bare.csv", bench.read("trace.csv").replace(",strain", ",remark"));
     assert_eq!(first, refine("bare.csv", "third.toml"));
 }

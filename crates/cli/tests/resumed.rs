@@ -1,4 +1,4 @@
-//! A filter that is stopped, and goes on from its state.
+//! A filter that is stopped and resumes from its state.
 
 use crate::common::{Bench, Run};
 
@@ -8,7 +8,7 @@ fn with<'a>(flags: &[&'a str]) -> Vec<&'a str> {
     [&FILTER[..], flags].concat()
 }
 
-/// Header and rows of a text.
+/// Splits a text into header and rows.
 fn apart(text: &str) -> (String, Vec<String>) {
     let mut lines = text.lines().skip_while(|line| line.starts_with('#'));
     (lines.next().unwrap().to_owned(), lines.map(str::to_owned).collect())
@@ -40,7 +40,7 @@ fn pieces_of_a_stream_are_the_stream() {
             if is_last {
                 more.drain(..2);
             }
-            // What will be known the state knows.
+            // The state contains the strains known later.
             let options = if first || flags[0] != "--known" { flags } else { &[] };
             let text = bench.feed(&with(&[options, &more].concat()), joined(&header, &rows[piece])).ok();
             found.extend(apart(&text).1);
@@ -96,7 +96,7 @@ fn a_state_that_does_not_belong_here_is_refused() {
     bench.write("other.toml", sensor.replacen(line, &format!("strain_sd_scale = {}", 1.01 * scale), 1));
     let other = ["-q", "filter", "-", "--sensor", "other.toml", "--resume", "state.toml"];
     refused(&bench.feed(&other, part(&rows[20..])), 4, "state.toml: the state belongs to another sensor");
-    // A stream that fails leaves the state of before, and nothing takes another file's place.
+    // If a stream fails, the state of before stays, and no other file is replaced.
     let broken = part(&rows[20..30]) + "x,y\n";
     refused(&bench.feed(&with(&["--resume", "state.toml", "--save-state", "state.toml"]), broken), 4, "expected");
     assert_eq!(bench.read("state.toml"), state);

@@ -1,4 +1,4 @@
-//! `-o` of `filter` and `smooth`: what goes to stdout, in a file that is treated as other commands treat theirs.
+//! `-o` of `filter` and `smooth`: the output of stdout in a file, with the same rules as other commands' files.
 
 use crate::common::{Bench, ESTIMATES_HEADER, SIMULATE};
 
@@ -18,7 +18,7 @@ fn a_file_holds_what_stdout_gets() {
             assert_eq!(bench.run(&estimate(command, &["-o", "estimates.csv"])).ok(), "");
             assert!(bench.read("estimates.csv") == printed, "{command}");
         }
-        // Fewer columns are estimates still, and may be replaced.
+        // Fewer columns are still estimates, and may be replaced.
         for _ in 0..2 {
             bench.run(&estimate(command, &["-o", "few.csv", "--columns", "time_s,strain,strain_sd"])).ok();
         }
@@ -50,7 +50,7 @@ fn what_is_not_made_of_estimates_stays() {
     assert!(bench.read("other.csv").starts_with(ESTIMATES_HEADER));
 }
 
-/// A recording that breaks leaves the estimates as they were; a stream that breaks has had its rows.
+/// A recording that breaks leaves the estimates as they were; a stream that breaks keeps its rows so far.
 #[test]
 fn rows_of_a_broken_recording_and_of_a_broken_stream() {
     let bench = Bench::calibrated();
@@ -65,7 +65,7 @@ fn rows_of_a_broken_recording_and_of_a_broken_stream() {
     let live = bench.feed(&["filter", "-", "--sensor", "sensor.toml", "-o", "estimates.csv"], broken.clone());
     assert_eq!(live.code, Some(4));
     let rows = bench.read("estimates.csv");
-    // The same rows: with what other time they come does not change them.
+    // The same rows, whatever other columns accompany them.
     assert!(rows.starts_with(ESTIMATES_HEADER) && rows == before, "{}", rows.lines().count());
     assert_eq!(bench.files(), ["estimates.csv", "sensor.toml", "trace.csv"]);
 }

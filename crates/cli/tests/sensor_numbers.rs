@@ -1,4 +1,4 @@
-//! Whatever one number of a sensor file is changed to: it is refused by its name, or every number that comes out is one.
+//! Any changed number of a sensor file is refused by its name, or all resulting numbers are finite.
 
 use ohmstrain::{Error, Estimate, Evaluation, Recording, Sensor};
 use toml::Value;
@@ -8,8 +8,8 @@ use crate::common::{Bench, Csv};
 /// Values that a number is changed to.
 const HOSTILE: [f64; 9] = [f64::NAN, f64::INFINITY, -1.0, 0.0, 1e300, -1e300, 1e9, -1e9, 1e-12];
 
-/// Paths of all numbers that are no counts. Of what is only told, and of the rows that a correction
-/// learned from, one of each kind will do.
+/// Collects the paths of all numbers that are not counts. Of purely informative numbers, and of the rows that a correction
+/// learned from, one of each kind is enough.
 fn numbers(value: &Value, path: &str, found: &mut Vec<String>) {
     match value {
         Value::Float(_) => found.push(path.to_string()),
@@ -29,7 +29,7 @@ fn numbers(value: &Value, path: &str, found: &mut Vec<String>) {
     }
 }
 
-/// The value at a path.
+/// Returns the value at a path.
 fn at<'a>(value: &'a mut Value, path: &str) -> &'a mut Value {
     path.split(['.', '[']).fold(value, |value, step| match step.strip_suffix(']') {
         Some(index) => &mut value[index.parse::<usize>().unwrap()],
@@ -55,7 +55,7 @@ fn missing(rows: &[Estimate]) -> Vec<bool> {
     rows.iter().flat_map(of_row).map(is_missing).collect()
 }
 
-/// Filters, smooths and scores a short recording: numbers that are missing, and scores.
+/// Filters, smooths and scores a short recording; returns which numbers are missing, and the scores.
 fn used(sensor: &Sensor, recording: &Recording, [time_s, readings, _]: &[Vec<f64>; 3]) -> (Vec<bool>, Evaluation) {
     let mut filter = sensor.filter().build().unwrap();
     let filtered: Vec<Estimate> = time_s.iter().zip(readings).map(|(t, r)| filter.step(*t, *r).unwrap()).collect();
@@ -63,8 +63,8 @@ fn used(sensor: &Sensor, recording: &Recording, [time_s, readings, _]: &[Vec<f64
     (missing(&[filtered, smoothed].concat()), sensor.evaluate(recording).unwrap().unwrap())
 }
 
-/// Checks that a change is refused by the number's name and line: by itself, or by what it has to go together with, a number
-/// beside it or another table.
+/// Checks that a change is refused by the number's name and line: on its own, or together with a related number beside it or in
+/// another table.
 fn is_refused_by_name(error: &Error, path: &str, text: &str) {
     let message = error.in_file("changed.toml");
     let field = message.split('`').nth(1).unwrap();
@@ -78,7 +78,7 @@ fn is_refused_by_name(error: &Error, path: &str, text: &str) {
     assert!(line.starts_with(last) || line.contains(field.rsplit('.').next().unwrap()), "{path}: {line}");
 }
 
-/// Changes each number of `sensor.toml`, and uses what is not refused.
+/// Changes each number of `sensor.toml`, and uses every sensor that is not refused.
 fn survives(bench: &Bench) {
     let file: Value = toml::from_str(&bench.read("sensor.toml")).unwrap();
     let mut paths = Vec::new();
@@ -107,11 +107,12 @@ fn survives(bench: &Bench) {
             }
         }
     }
-    // Of each number at least NaN; of most of them more.
+    // For each number at least NaN; for most of them more values.
     assert!(refused > 2 * paths.len(), "{refused} of {}", paths.len());
 }
 
-/// Time, reading and strain of the first and every fifth row of a minute, holds and movements; a reading is missing now and then.
+/// Returns time, reading and strain of the first and every fifth row of a minute, with holds and movements; some readings are
+/// missing.
 fn short(bench: &Bench) -> [Vec<f64>; 3] {
     let trace = Csv::new(&bench.read("trace.csv"));
     let rows = |name: &str| trace.numbers(name).into_iter().take(300).step_by(5).collect::<Vec<f64>>();
@@ -140,7 +141,7 @@ fn of_a_sensor_with_a_learned_correction() {
     survives(&bench);
 }
 
-/// The reversed range made `evaluate` panic.
+/// A reversed range made `evaluate` panic.
 #[test]
 fn a_reversed_range_is_refused_where_it_stands() {
     let bench = Bench::calibrated();

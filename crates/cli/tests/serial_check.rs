@@ -35,7 +35,7 @@ fn printed_by(bench: &Bench, sketch: &str) -> Option<String> {
     Some(String::from_utf8(run.stdout).unwrap())
 }
 
-/// The same with one number everywhere.
+/// Returns the same output with one number replaced everywhere.
 fn with(printed: &str, label: &str, number: &str) -> String {
     let cell = |cell: &str| if cell.starts_with(label) { format!("{label}{number}") } else { cell.to_owned() };
     let line = |line: &str| line.split(',').map(cell).collect::<Vec<_>>().join(",") + "\n";
@@ -53,7 +53,7 @@ fn a_board_agrees_until_it_runs_something_else() {
     let steps = printed.matches("step:").count();
     assert!(steps > 500 && said.starts_with(&format!("{steps} steps, 1 other lines\n")), "{said}");
     assert!(said.ends_with("\nThe board computes what this computer does.\n"), "{said}");
-    // Another estimator than the board's, other times than it was told, and flags that it has not.
+    // Another estimator than the board's, other intervals than its own, and other flags.
     let wrong = |what: &str, args: &[&str], message: &str| {
         let run = bench.run(args);
         assert!(run.code == Some(3) && run.stderr.contains(message), "{what}: {}", run.stderr);
@@ -65,7 +65,7 @@ fn a_board_agrees_until_it_runs_something_else() {
     wrong("flags", &CHECK, &format!(" of {steps} steps: other flags on the board"));
 }
 
-/// A filter of which every tenth step is refused.
+/// A filter that refuses every tenth step.
 const REFUSES: &str = r#"#include "ohmstrain.h"
 static ohmstrain_status now_and_then(ohmstrain_state *state, float dt_s, float reading, float sd, ohmstrain_residual *out) {
   static int steps = 0;
@@ -73,7 +73,7 @@ static ohmstrain_status now_and_then(ohmstrain_state *state, float dt_s, float r
 }
 "#;
 
-/// The sketch says so and goes on: the next step takes the time of the one that was refused.
+/// The sketch reports it and continues: the next step includes the time of the refused one.
 #[test]
 fn a_sketch_goes_on_after_a_refused_step() {
     let bench = Bench::calibrated();
@@ -109,13 +109,13 @@ fn lines_that_are_lost_or_missing_are_said() {
     }
 }
 
-/// The recorder prints a trace of converter codes, which every command reads, and `import` too.
+/// The recorder prints a trace of converter codes that every command reads, including `import`.
 #[test]
 fn what_the_recorder_prints_is_a_trace() {
     let bench = Bench::calibrated();
     bench.run(&["export", "--sensor", "sensor.toml", "--target", "c", "-o", "c", "--force"]).ok();
     let Some(printed) = printed_by(&bench, "c/examples/recorder/recorder.ino") else { return };
-    // The board's own message when it starts is no part of it.
+    // The board's own message at its start does not belong to it.
     let (_, trace) = printed.split_once('\n').unwrap();
     assert!(trace.starts_with("# front_end = divider reference_ohm=10000.0 side=low bits=10 noise_codes="), "{trace}");
     assert!(trace.contains("\ntime_us,adc\r\n"), "{trace}");

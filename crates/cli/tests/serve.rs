@@ -1,4 +1,4 @@
-//! `serve`: the page, from this computer to this computer.
+//! `serve`: the page, served on this computer.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
@@ -9,7 +9,7 @@ use assert_cmd::cargo::cargo_bin;
 
 const PAGE: &str = "<!doctype html>\n<title>strain \u{b5}</title>\n";
 
-/// A running program, stopped when this is dropped, and the address that it prints.
+/// A running program, stopped on drop, and the address that it prints.
 struct Served {
     program: Child,
     address: String,
@@ -26,7 +26,7 @@ impl Served {
         Self { program, address }
     }
 
-    /// Head and body of the answer to a request.
+    /// Returns head and body of the answer to a request.
     fn ask(&self, method: &str, path: &str) -> (String, String) {
         let mut stream = TcpStream::connect(&self.address).unwrap();
         write!(stream, "{method} {path} HTTP/1.1\r\nHost: {}\r\nConnection: close\r\n\r\n", self.address).unwrap();

@@ -1,4 +1,4 @@
-//! Recordings as they arrive: row in, row out.
+//! Recordings as they arrive: one row in, one row out.
 
 use std::io::{BufRead, BufReader, ErrorKind, Write};
 use std::process::{Child, ChildStdin, Command, Stdio};
@@ -9,7 +9,7 @@ use std::time::Duration;
 use crate::common::{Bench, Csv, ESTIMATES_HEADER, Run};
 use assert_cmd::cargo::cargo_bin;
 
-/// Far more than a row needs on any machine; less than anybody waits for a test that hangs.
+/// Far more than a row takes on any machine, but a bearable wait for a test that hangs.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 const FILTER: [&str; 3] = ["filter", "--sensor", "sensor.toml"];
@@ -26,7 +26,7 @@ fn finish(arguments: &[&str], child: Child) -> Run {
     Run::new(arguments, child.wait_with_output().unwrap())
 }
 
-/// The lines that a running program prints, as they come.
+/// Returns the lines of a running program as they arrive.
 fn lines_of(child: &mut Child) -> Receiver<String> {
     let stdout = BufReader::new(child.stdout.take().unwrap());
     let (sender, receiver) = channel();
@@ -34,7 +34,7 @@ fn lines_of(child: &mut Child) -> Receiver<String> {
     receiver
 }
 
-/// Writes row by row and asks for the answer to each before the next one is written.
+/// Writes row by row, and waits for the answer to each before the next one is written.
 fn converse(trace: &str, stdin: &mut ChildStdin, answers: &Receiver<String>) -> Vec<String> {
     let mut said = Vec::new();
     for line in trace.lines() {
@@ -61,7 +61,7 @@ fn a_live_pipe_is_answered_row_by_row() {
     let expected = bench.feed(&FILTER, trace.as_str()).ok();
     let mut sources = vec!["-"];
     if cfg!(target_os = "linux") {
-        // A pipe by another name.
+        // A pipe under another name.
         sources.push("/dev/stdin");
     }
     for source in sources {
@@ -128,7 +128,7 @@ fn a_reader_that_leaves_a_live_filter_ends_it_quietly() {
         stdout.read_line(&mut first).unwrap();
     }
     assert_eq!(first.trim_end(), ESTIMATES_HEADER);
-    // The filter notices at its next row, and then nobody reads ours.
+    // The filter notices at its next row, and then our output has no reader.
     let rest = trace.lines().skip(10).try_for_each(|line| writeln!(stdin, "{line}"));
     assert!(rest.is_ok() || rest.is_err_and(|error| error.kind() == ErrorKind::BrokenPipe));
     drop(stdin);
@@ -172,14 +172,14 @@ fn one_row_is_a_recording() {
         assert_eq!((one.cells("time_s")[0], one.cells("resistance_ohm")[0]), ("12.5", "1700"));
         let nothing = estimates("nothing.csv");
         assert_eq!((nothing.cells("flags")[0].split('|').next(), nothing.cells("nis")[0]), (Some("missing"), ""));
-        // A reading says something, even a single one: its estimate is surer than that far away from where strains may be.
+        // Even a single reading is informative: its estimate has a smaller deviation than the prior of strain.
         let first = |rows: &Csv, column: &str| rows.numbers(column)[0];
         let off = first(&one, "strain") - first(&nothing, "strain");
         assert!(first(&one, "strain_sd") < first(&nothing, "strain_sd").hypot(off));
     }
 }
 
-/// Cells that every row has, whatever happens; the others may be unknown.
+/// Cells that every row has in any case; the others may be unknown.
 const ALWAYS: [&str; 9] = [
     "time_s",
     "strain",
@@ -250,7 +250,7 @@ fn irregular_steps_and_gaps_work() {
     }
 }
 
-/// The filter knows differences of time only.
+/// The filter uses differences of time only.
 #[test]
 fn microseconds_that_wrap_are_seconds_that_do_not() {
     let bench = Bench::calibrated();
@@ -294,7 +294,7 @@ fn bad_lines_are_skipped_where_that_is_wanted_and_counted() {
     assert_eq!(nothing.code, Some(4));
 }
 
-/// A board that starts says something first; who joins a stream late has not seen its header.
+/// A board prints other lines when it starts; a stream that is joined late has no header.
 #[test]
 fn a_stream_may_begin_with_something_else_or_in_its_middle() {
     let bench = Bench::calibrated();
@@ -326,12 +326,12 @@ fn a_stream_may_begin_with_something_else_or_in_its_middle() {
     odd.fails(2, "--header: expected a header with the column `time_s` or `time_us`, found `a,b`");
 }
 
-/// Rows of a clock that starts at zero, `count` of them, each 0.2 s after the one before.
+/// Returns `count` rows of a clock that starts at zero, each 0.2 s after the previous one.
 fn clock(count: usize) -> String {
     (0..count).map(|row| format!("{:.1},{}\n", 0.2 * row as f64, 1600 + 5 * (row % 40))).collect()
 }
 
-/// The clock of a board that was reset begins anew, with its header or without, and so does the filter: at once, once.
+/// The clock of a reset board restarts, with its header or without, and so does the filter: at once, and once.
 #[test]
 fn a_clock_that_starts_again_goes_on() {
     let bench = Bench::calibrated();
@@ -339,7 +339,7 @@ fn a_clock_that_starts_again_goes_on() {
     let header = "time_s,resistance_ohm\n";
     let (first, second) = (clock(100), clock(50));
     let alone = |rows: &str| bench.feed(&FILTER, format!("{header}{rows}")).ok();
-    // Without a header two rows are late before the third tells that the clock has started again.
+    // Without a header, two rows are late before the third shows that the clock has restarted.
     let from_third = second.splitn(3, '\n').nth(2).unwrap();
     let cases = [("", from_third, 104, 2), ("boot\ntime_s,resistance_ohm\n", &second, 104, 1)];
     for (between, rest, line, skipped) in cases {
@@ -359,7 +359,7 @@ fn a_clock_that_starts_again_goes_on() {
             }
         }
     }
-    // One late row, late rows now and then, and late rows that do not go on from each other are bad lines and no clock.
+    // One late row, occasional late rows, and late rows that do not continue each other are bad lines, not a restarted clock.
     let strays = first.replace("10.0,", "3.0,1600\n10.0,").replace("15.0,", "4.0,1\n3.9,1\n3.8,1\n3.7,1\n15.0,");
     let run = bench.feed(&skipping, format!("{header}{strays}"));
     assert!(run.warnings.concat().contains("5 lines were skipped") && run.warnings.len() == 1, "{:?}", run.warnings);

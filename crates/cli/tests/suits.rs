@@ -1,11 +1,11 @@
-//! Files and arguments that cannot be meant for the sensor: a question that says how to answer it, not an estimate.
+//! Files and arguments that do not suit the sensor: a question that contains its answer instead of an estimate.
 
 use crate::common::{Bench, CALIBRATED_UNTIL, Csv, change_rows};
 use serde_json::Value;
 
 const SENSOR: [&str; 2] = ["--sensor", "sensor.toml"];
 
-/// The recording with readings, or, in the last column, strains, times a factor.
+/// Returns the recording with its readings, or its strains in the last column, times a factor.
 fn scaled(bench: &Bench, column: usize, factor: f64) -> String {
     change_rows(&bench.read("trace.csv"), |_, cells| {
         cells[column] = (factor * cells[column].parse::<f64>().unwrap()).to_string();
@@ -47,7 +47,7 @@ fn readings_in_another_unit_are_asked_about() {
     asks(&bench, &["filter", "other.csv"], 4, &start, "are they in kilo-ohms?");
 }
 
-/// R0 in another unit, or of another sensor, whoever says it.
+/// An R0 in another unit, or of another sensor, from any source.
 #[test]
 fn a_rest_resistance_of_no_such_sensor_is_refused() {
     let bench = Bench::calibrated();
@@ -66,7 +66,7 @@ fn a_rest_resistance_of_no_such_sensor_is_refused() {
             );
         }
     }
-    // So is what the first readings give.
+    // The same holds for R0 from the first readings.
     for command in [&["filter"][..], &["smooth"], &["evaluate"], &["refine", "-o", "new.toml"]] {
         let told = [command, &["other.csv", "--rest-resistance", "first:5"]].concat();
         asks(&bench, &told, 4, "other.csv: --rest-resistance first:5: resistance at rest: expected ", "found 14");
@@ -77,7 +77,7 @@ fn a_rest_resistance_of_no_such_sensor_is_refused() {
     assert_eq!(near.code, Some(0), "{}", near.stderr);
 }
 
-/// The estimates are those of the recording in ohms once the readings' unit is given.
+/// With the readings' unit, the estimates equal those of the recording in ohms.
 #[test]
 fn the_answer_is_the_unit() {
     let bench = Bench::calibrated();
@@ -89,12 +89,12 @@ fn the_answer_is_the_unit() {
         let calibrated = ["--rest-resistance", "calibrated"];
         let in_ohm = strains(&[&["trace.csv"][..], &calibrated].concat());
         let in_kohm = strains(&[&["other.csv"][..], &calibrated, &["--unit", "resistance=kohm"]].concat());
-        // Rounding of the scaled readings, 1e-16, times what a filter makes of it.
+        // Rounding of the scaled readings, 1e-16, times its amplification by a filter.
         assert!(in_ohm.iter().zip(&in_kohm).all(|(a, b)| (a - b).abs() < 1e-8), "{command}");
     }
 }
 
-/// Somebody waits for the rows of a stream: it goes on, and says what is doubtful.
+/// A stream has a reader who waits for the rows: it continues, with a warning.
 #[test]
 fn a_live_stream_is_warned_of() {
     let bench = Bench::calibrated();
@@ -106,7 +106,7 @@ fn a_live_stream_is_warned_of() {
     assert_eq!(Csv::new(&run.stdout).len(), rows);
 }
 
-/// A plug that was not in yet, and a sensor of another size, are no other unit.
+/// A plug that was not connected yet, and a sensor of another size, do not count as another unit.
 #[test]
 fn what_no_unit_explains_is_no_reason_to_stop() {
     let bench = Bench::calibrated();
@@ -138,7 +138,7 @@ fn a_reference_in_percent_is_asked_about() {
     let header = 1 + percent.lines().position(|line| line.starts_with("time_s")).unwrap();
     let start = format!("other.csv:{header}: column `strain`: expected strains of up to 0.3333, as in the calibration");
     asks(&bench, &["evaluate", "other.csv"], 4, &start, "in percent?");
-    // One bad row is a bad row.
+    // One bad row does not mean a wrong unit.
     let outlier = change_rows(&bench.read("trace.csv"), |row, cells| {
         if row == 700 {
             cells[2] = "30".into()
@@ -164,8 +164,8 @@ fn a_strain_to_start_at_lies_within_the_limits() {
     }
 }
 
-/// A sensor with a fifth more resistance, known at rest, is scored as the one that was calibrated; so is what it is
-/// compared with.
+/// A sensor with a fifth more resistance and a known reading at rest has the scores of the calibrated one; so have the
+/// baselines.
 #[test]
 fn evaluate_takes_a_rest_resistance_as_filter_does() {
     let bench = Bench::calibrated();
@@ -182,7 +182,7 @@ fn evaluate_takes_a_rest_resistance_as_filter_does() {
     let rest = (1.2 * rest_reading(&bench)).to_string();
     assert!(alike(rmse(&["larger.csv", "--rest-resistance", &rest])));
     assert!(!alike(rmse(&["larger.csv"])));
-    // Whatever the first reading is, it is a fifth more in the other recording.
+    // Whatever the first reading is, that of the other recording is a fifth larger.
     let of_first = rmse(&["trace.csv", "--rest-resistance", "first:1"]);
     let larger = rmse(&["larger.csv", "--rest-resistance", "first:1"]);
     assert!(of_first.iter().zip(&larger).all(|(a, b)| (a - b).abs() < 1e-8));

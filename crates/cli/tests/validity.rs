@@ -1,8 +1,8 @@
-//! Warnings where a sensor file is used outside of what its calibration has seen.
+//! Warnings about a sensor file used outside its calibrated range.
 
 use crate::common::{Bench, CALIBRATED_UNTIL, Csv, SIMULATE, change_rows};
 
-/// `trace.csv` and a sensor calibrated on its first rows, `seen.csv`.
+/// Returns a folder with `trace.csv` and a sensor calibrated on its first rows, `seen.csv`.
 fn calibrated() -> Bench {
     let bench = Bench::new();
     bench.run(&[&SIMULATE[..], &["-o", "trace.csv"]].concat()).ok();
@@ -38,7 +38,7 @@ fn a_longer_recording_is_warned_of_once_where_readings_drifted() {
     let bench = calibrated();
     let sensor = bench.read("sensor.toml");
     let with = |drifts: &str| sensor.replace("drifts = true", drifts).replace("drifts = false", drifts);
-    // Five rows a second: the first after a twentieth more than the calibration's 299.8 s.
+    // Five rows a second: the first row more than a twentieth beyond the calibration's 299.8 s.
     let expected = "ohmstrain: warning: trace.csv: at 314.8 s: longer than the 299.8 s of the calibration, in which readings \
                     drifted; estimates are extrapolations\n";
     for (drifts, expected) in [("drifts = true", &[expected][..]), ("drifts = false", &[])] {
@@ -63,7 +63,7 @@ fn readings_and_strains_that_calibration_has_not_seen_are_warned_of() {
     let warnings = warned(&bench, &["evaluate", "scaled.csv"]);
     let of = |what: &str| warnings.iter().filter(|line| line.contains(what)).count();
     assert_eq!((of(": resistance_ohm is outside of"), of(": strain is outside of")), (1, 1), "{warnings:?}");
-    // The filter has no reference, and no objection to readings if R₀ is as much larger.
+    // The filter has no reference, and accepts readings that are larger in proportion to R₀.
     let rest: f64 =
         bench.read("sensor.toml").lines().find_map(|line| line.strip_prefix("measured_rest = ")?.parse().ok()).unwrap();
     assert_eq!(warned(&bench, &["filter", "scaled.csv"]).len(), warnings.len() - 1);
@@ -72,8 +72,8 @@ fn readings_and_strains_that_calibration_has_not_seen_are_warned_of() {
     assert_eq!(warned(&bench, &["filter", "scaled.csv", "--rest-resistance", &(2.0 * rest).to_string()]), [""; 0]);
 }
 
-/// Rates up to 1.3 times the fastest are no news, and beyond it in one row of a hundred they are chance. Twice as fast is what no
-/// calibration has seen.
+/// Rates up to 1.3 times the fastest cause no warning, and higher ones in one row of a hundred count as chance. Twice the speed
+/// was never seen in calibration.
 #[test]
 fn twice_the_speed_is_warned_of_and_the_speed_of_the_calibration_is_not() {
     let bench = Bench::calibrated();
@@ -97,7 +97,7 @@ fn twice_the_speed_is_warned_of_and_the_speed_of_the_calibration_is_not() {
 #[test]
 fn a_faster_movement_is_warned_of() {
     let bench = calibrated();
-    // A sensor whose calibration was slower, by its own word.
+    // A sensor whose calibration states a slower speed.
     let slow: String = bench
         .read("sensor.toml")
         .lines()

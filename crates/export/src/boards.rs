@@ -24,7 +24,7 @@ pub struct Board {
 const KIB: usize = 1024;
 const MHZ: u32 = 1_000_000;
 
-/// All boards. Flash and RAM are the chip's, or the module's where flash is outside of the chip.
+/// All boards. Flash and RAM are the chip's; flash is the module's if it is outside the chip.
 pub const BOARDS: [Board; 11] = [
     Board {
         name: "uno",
@@ -71,7 +71,7 @@ pub const BOARDS: [Board; 11] = [
         title: "Teensy 4.0, i.MX RT1062",
         clock_hz: 600 * MHZ,
         flash: 1984 * KIB,
-        // Half of 1 MiB, the part that is tightly coupled.
+        // Half of 1 MiB: the tightly coupled part.
         ram: 512 * KIB,
         processor: Processor::Single,
         source: "NXP IMXRT1060CEC",
@@ -80,9 +80,9 @@ pub const BOARDS: [Board; 11] = [
         name: "esp32",
         title: "ESP32-WROOM-32",
         clock_hz: 240 * MHZ,
-        // The larger of Arduino's default partitions for a program.
+        // Size of the larger one of Arduino's default partitions for a program.
         flash: 1280 * KIB,
-        // Of 520 KiB, what the linker gives to static data.
+        // Share of 520 KiB that the linker gives to static data.
         ram: 320 * KIB,
         processor: Processor::Single,
         source: "Espressif ESP32 Series v4.3",
@@ -135,33 +135,34 @@ pub const BOARDS: [Board; 11] = [
     },
 ];
 
-/// Divisor of the time between two readings: half of it is left for the rest of the program, and for cycles beyond one an instruction.
+/// Divisor of the time between two readings: half of it is left for the rest of the program, and for instructions of several
+/// cycles.
 const OF_TIME: f64 = 2.0;
 /// Fraction of flash and RAM that a filter may take: a quarter is left for the rest of the program.
 const OF_MEMORY: (usize, usize) = (3, 4);
 
 impl Board {
-    /// The board of this name.
+    /// Returns the board of this name.
     pub fn named(name: &str) -> Option<&'static Self> {
         BOARDS.iter().find(|board| board.name == name)
     }
 
-    /// Names of all boards, for messages.
+    /// Lists the names of all boards, for messages.
     pub fn names() -> String {
         BOARDS.map(|board| board.name).join(", ")
     }
 
-    /// Instructions that a step may take where readings come every `dt_s` seconds.
+    /// Returns the number of instructions that a step may take for readings every `dt_s` seconds.
     pub fn instructions(&self, dt_s: f64) -> usize {
         (f64::from(self.clock_hz) * dt_s / OF_TIME) as usize
     }
 
-    /// Flash that a filter may take, bytes.
+    /// Returns the flash that a filter may take, bytes.
     pub const fn flash_for_filter(&self) -> usize {
         self.flash / OF_MEMORY.1 * OF_MEMORY.0
     }
 
-    /// RAM that a filter may take, its stack included, bytes.
+    /// Returns the RAM that a filter may take, stack included, bytes.
     pub const fn ram_for_filter(&self) -> usize {
         self.ram / OF_MEMORY.1 * OF_MEMORY.0
     }

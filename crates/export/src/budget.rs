@@ -1,4 +1,4 @@
-//! The best filter that a chip has room for.
+//! The best filter that fits a chip.
 
 use std::str::FromStr;
 
@@ -10,7 +10,7 @@ use super::cost::{Cost, Processor, cost_of};
 use super::plan::{ChipFilter, Plan};
 use super::reduced::RowBudget;
 
-/// Largest cost of a filter, on a Cortex-M4F or on a board.
+/// Largest permitted cost of a filter, on a Cortex-M4F or on a board.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Budget {
     board: Option<&'static Board>,
@@ -19,18 +19,18 @@ pub struct Budget {
     ram: Option<usize>,
 }
 
-/// Room for a filter.
+/// Resources available to a filter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Room {
-    /// Instructions a step.
+    /// Instructions per step.
     pub instructions: usize,
     /// Flash, bytes.
     pub flash: usize,
-    /// RAM, the stack included, bytes.
+    /// RAM, stack included, bytes.
     pub ram: usize,
 }
 
-/// Instructions a step of a `lean` filter: 100 steps a second are a tenth of a processor of 16 MHz.
+/// Instructions per step of a `lean` filter: at 100 steps per second it uses a tenth of a 16 MHz processor.
 const LEAN: usize = 15_000;
 
 fn expected() -> String {
@@ -65,17 +65,17 @@ impl FromStr for Budget {
 }
 
 impl Budget {
-    /// The board, if it is one's.
+    /// Returns the board, if the budget names one.
     pub const fn board(&self) -> Option<&'static Board> {
         self.board
     }
 
-    /// Processor on which costs are compared.
+    /// Returns the processor on which costs are compared.
     fn processor(&self) -> Processor {
         self.board.map_or(Processor::Single, |board| board.processor)
     }
 
-    /// Room for a filter whose readings come every `dt_s` seconds. A number that is given stands before the board's.
+    /// Returns the room for a filter with readings every `dt_s` seconds. An explicit number overrides the board's.
     pub fn room(&self, dt_s: f64) -> Room {
         let of_board = self.board.map(|board| Room {
             instructions: board.instructions(dt_s),
@@ -90,7 +90,7 @@ impl Budget {
         }
     }
 
-    /// Cost of a plan where the budget is compared with it: on the board, or on a Cortex-M4F.
+    /// Computes the cost of a plan on the budget's processor: the board's, or a Cortex-M4F.
     ///
     /// # Errors
     /// If the sensor has no exported form.
@@ -101,7 +101,7 @@ impl Budget {
 }
 
 impl Room {
-    /// Returns the resource that a filter takes too much of, in words; `None` if it fits.
+    /// Names the resource that a filter exceeds; `None` if it fits.
     fn lacks(&self, cost: &Cost) -> Option<String> {
         let all = [
             (cost.instructions, self.instructions, "instructions"),
@@ -115,7 +115,7 @@ impl Room {
     }
 }
 
-/// A plan that was compared with a budget.
+/// A plan compared with a budget.
 #[derive(Clone, Debug)]
 pub struct Candidate {
     /// The plan.
@@ -124,11 +124,11 @@ pub struct Candidate {
     pub words: String,
     /// Cost on the budget's processor.
     pub cost: Cost,
-    /// Resource that it takes too much of; `None` if it fits.
+    /// Resource that it exceeds; `None` if it fits.
     pub lacks: Option<String>,
 }
 
-/// Part of the correction that is left.
+/// Part of the correction that is kept.
 #[derive(Clone, Copy)]
 enum Left {
     All,
@@ -136,7 +136,7 @@ enum Left {
     None,
 }
 
-/// Hypotheses and what is left of the correction, in the order of their error: the geometric mean over the cases of
+/// Numbers of hypotheses and kept parts of the correction, sorted by their error: the geometric mean over the cases of
 /// docs/chip.md.
 const ORDER: [(usize, Left); 18] = [
     (8, Left::All),
@@ -163,7 +163,7 @@ const fn rows(mean: usize, variance: usize) -> Left {
     Left::Some(RowBudget { mean, variance })
 }
 
-/// Plans of a sensor's default, the best by the table first, and whether they fit.
+/// Returns the plans of a sensor's default filter, the best by the table first, each with the resource that it exceeds.
 ///
 /// # Errors
 /// If the sensor has no exported form, or nothing fits.
@@ -193,7 +193,7 @@ pub fn first_fitting(params: &SensorParams, budget: &Budget, dt_s: f64) -> Resul
     Ok(fits.map_or_else(Plan::default, |candidate| candidate.plan))
 }
 
-/// Plans of a sensor's default, the best first.
+/// Returns the plans of a sensor's default filter, the best first.
 fn plans(params: &SensorParams) -> Vec<Plan> {
     let kind = params.filter_of(params.default_estimator);
     let is_corrected = params.default_estimator == EstimatorKind::Corrected;

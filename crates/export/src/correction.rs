@@ -1,4 +1,4 @@
-//! The learned correction as the templates have it.
+//! The learned correction in the form that the templates take.
 
 use ohmstrain_ekf::correction::{Decay, FILTER_INPUTS, TIME_CONSTANTS_S};
 use ohmstrain_sensor::PortableCorrection;
@@ -14,15 +14,15 @@ pub struct CorrectionConstants {
     centre: Literal,
     half_range: Literal,
     rates: [Literal; 2],
-    /// Offset and slope of each low-pass' start.
+    /// Offset and slope of each low-pass filter's start.
     starts: Vec<[Literal; 2]>,
     time_constants_s: Vec<Literal>,
-    /// Decay of the low-passes in the usual time between readings, and the mean over it.
+    /// Decay of the low-pass filters over the usual time between readings, and the mean over it.
     decays: Vec<Literal>,
     mean_decays: Vec<Literal>,
     rows: RowConstants,
     mean: Vec<Literal>,
-    /// `None` for an input that never changes: infinite.
+    /// Standard deviation; `None` for a constant input: infinite.
     sd: Vec<Option<Literal>>,
     lower: Vec<Literal>,
     upper: Vec<Literal>,
@@ -34,7 +34,7 @@ pub struct CorrectionConstants {
     variance_factor: Literal,
 }
 
-/// Rows for C, and in blocks for Rust.
+/// Rows in order for C, and in blocks for Rust.
 #[derive(Debug, Serialize)]
 struct RowConstants {
     count: usize,
@@ -64,7 +64,7 @@ struct ProcessConstants {
     widening: Literal,
     least_variance: Literal,
     weights: Vec<Literal>,
-    /// Column by column of stripes of four rows.
+    /// Stripes of four rows, stored column by column.
     explained: Vec<Vec<Literal>>,
 }
 

@@ -1,9 +1,9 @@
-//! About what an exported filter costs on a Cortex-M4F: what a step takes, and how much memory.
+//! Approximate cost of an exported filter on a Cortex-M4F: instructions per step, and memory.
 //!
-//! The state's size is computed, and so are the tables in flash. Instructions, code and stack are sums over what there is
-//! (hypotheses, branches, rows); the coefficients below are least squares over what `scripts/exported-c.sh` counts in QEMU for filters
-//! of all kinds (arm-none-eabi-gcc 12.2, -O2 -fno-math-errno), which checks in turn that no estimate is further than a
-//! tenth from what it counts.
+//! The state's size and the tables in flash are computed. Instructions, code and stack are sums over hypotheses, branches and
+//! rows; the coefficients below are least-squares fits to the counts of `scripts/exported-c.sh` in QEMU for filters of all
+//! kinds (arm-none-eabi-gcc 12.2, -O2 -fno-math-errno). That script checks in turn that no estimate is further than a tenth
+//! from its count.
 
 use ohmstrain_ekf::correction::{BLOCK, FEATURES, OUTPUTS, TIME_CONSTANTS_S};
 use ohmstrain_sensor::{EstimatorKind, GaugeParams, LawParams, PortableCorrection, SensorParams, with_sizes};
@@ -14,21 +14,21 @@ use super::plan::{ChipFilter, Plan};
 use super::vectors::{self, Work};
 use super::{ExportError, too_many_branches};
 
-/// About what a filter costs.
+/// Approximate cost of a filter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Cost {
-    /// Instructions a step, with a reading, at the usual interval.
+    /// Instructions per step, with a reading, at the usual interval.
     pub instructions: usize,
     /// Code and constants, bytes.
     pub flash: usize,
-    /// The state, bytes: exact, but for the padding of another processor.
+    /// The state, bytes: exact, apart from the padding of another processor.
     pub state: usize,
-    /// The stack that a step takes, bytes.
+    /// Stack of a step, bytes.
     pub stack: usize,
 }
 
 impl Cost {
-    /// Memory that a filter takes while it runs, bytes.
+    /// Returns the memory of a running filter, bytes.
     pub const fn ram(&self) -> usize {
         self.state + self.stack
     }
@@ -36,20 +36,20 @@ impl Cost {
 
 /// Cost of a kind of filter without a correction.
 struct OfKind {
-    /// Instructions of a step; and for each hypothesis that is updated, for each of its branches, for a curve with an exponential.
+    /// Instructions per step; and per updated hypothesis, per branch of it, and for a curve with an exponential.
     step: f64,
     update: f64,
     update_branch: f64,
     curve: f64,
-    /// Instructions for each hypothesis that is predicted without a reading, and for each of its branches.
+    /// Instructions per hypothesis predicted without a reading, and per branch of it.
     prediction: f64,
     prediction_branch: f64,
-    /// Instructions for each of these hypotheses, and each that the filter keeps.
+    /// Instructions per pair of one of these hypotheses and one that the filter keeps.
     pair: f64,
-    /// Bytes of code and tables; and for each branch.
+    /// Bytes of code and tables; and per branch.
     flash: f64,
     flash_branch: f64,
-    /// Bytes of the stack; and for each branch, for each hypothesis, for each branch of each hypothesis.
+    /// Bytes of the stack; and per branch, per hypothesis, per branch of each hypothesis.
     stack: [f64; 4],
 }
 
@@ -108,7 +108,7 @@ const HISTORIES: OfKind = OfKind {
     stack: [1130.0, 154.0, 66.0, 49.0],
 };
 
-/// Instructions of a correction for each row, for each simulated one, for each entry of the two triangles, for its quadratic functions.
+/// Instructions of a correction per row, per simulated row, per entry of the two triangles, and for its quadratic functions.
 const ROW: f64 = 183.0;
 const SIMULATED_ROW: f64 = 84.0;
 const ENTRY: f64 = 8.4;
@@ -124,15 +124,15 @@ const FLOAT: usize = 4;
 /// Arithmetic of a processor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Processor {
-    /// Single precision in hardware, as a Cortex-M4F has it.
+    /// Single precision in hardware, as in a Cortex-M4F.
     Single,
-    /// 32 bits, floating point in software, as a Cortex-M0+ has it.
+    /// 32 bits, floating point in software, as in a Cortex-M0+.
     Software,
     /// 8 bits, floating point in software.
     Avr,
 }
 
-/// Costs on a processor over those on a Cortex-M4F.
+/// Ratios of costs on a processor to those on a Cortex-M4F.
 struct Times {
     /// Instructions of an extended Kalman filter, of hypotheses, and of either with a correction.
     instructions: [f64; 3],
@@ -169,7 +169,7 @@ impl Cost {
         Self { instructions: times(self.instructions, instructions[kind]), flash: times(self.flash, flash), ..self }
     }
 
-    /// Returns the cost of a filter of a law whose steps take so much work.
+    /// Returns the cost of a filter with this law and this work per step.
     pub fn of(law: &LawParams, chip: &ChipFilter, work: Work) -> Self {
         let kind = match chip.filter.kind {
             EstimatorKind::SignSplit => &SIGN_SPLIT,
@@ -196,13 +196,13 @@ impl Cost {
             let entries = (BLOCK * stripes.len()) as f64;
             instructions += ROW * rows + ENTRY * entries;
             let inputs = (OUTPUTS + FEATURES) as f64;
-            // Inputs and two weights a row, two triangles, of each input four numbers of its scale and two relevances.
+            // Per row the inputs and two weights; two triangles; per input four numbers of its scale and two relevances.
             flash += CORRECTION_CODE + FLOAT as f64 * ((inputs + 2.0) * rows + 2.0 * entries + 6.0 * inputs);
             stack += CORRECTION_STACK;
             if let Some(simulated) = &learned.simulated {
                 let rows = simulated.rows.len() as f64;
                 instructions += SIMULATED_ROW * rows;
-                // Features and a weight a row, two ends of the range of each.
+                // Per row the features and a weight; per feature both ends of its range.
                 flash += SIMULATED_CODE + FLOAT as f64 * ((FEATURES as f64 + 1.0) * rows + 2.0 * FEATURES as f64);
             }
         }
@@ -215,7 +215,7 @@ impl Cost {
     }
 }
 
-/// Cost of a sensor's filter, its work counted over the motion of the self-test.
+/// Computes the cost of a sensor's filter, with its work counted over the motion of the self-test.
 ///
 /// # Errors
 /// If it has no exported form.
@@ -223,7 +223,7 @@ pub fn cost(params: &SensorParams, plan: &Plan, dt_s: f64) -> Result<Cost, Expor
     cost_of(params, &ChipFilter::new(params, plan)?, dt_s)
 }
 
-/// Cost of a filter that is at hand.
+/// Computes the cost of a given filter.
 pub fn cost_of(params: &SensorParams, chip: &ChipFilter, dt_s: f64) -> Result<Cost, ExportError> {
     let work = with_sizes!(params.law.branches.len(), B, N, L => work_of::<B, N, L>(params, chip, dt_s));
     let work = work.unwrap_or_else(|| Err(too_many_branches()))?;
@@ -238,19 +238,19 @@ fn work_of<const B: usize, const N: usize, const L: usize>(
     vectors::work::<B, N, L>(&FixedRate::<B, N>::new::<L>(params, chip, dt_s as f32)?)
 }
 
-/// Size of `ohmstrain_state`.
+/// Returns the size of `ohmstrain_state`, bytes.
 fn state(branches: usize, chip: &ChipFilter) -> usize {
     let filter = &chip.filter;
     let states = branches + 3;
     let gaussian = states + states * (states + 1) / 2;
-    // Weight, probability inside of the limits, phase; the number of hypotheses; of sign-split a pause and a flag.
+    // Weight, probability within the limits, phase; the number of hypotheses; for sign-split a pause and a flag.
     let words = match filter.kind {
         EstimatorKind::SignSplit => filter.hypotheses * (gaussian + 3) + 3,
         EstimatorKind::Hypotheses => filter.hypotheses * (gaussian + 3) + 1,
         _ => gaussian,
     };
-    // Readings and doubts: twenty-nine words; of a correction four, low-passes and features. A pause; strain, rate, their variances;
-    // rest reading.
+    // Readings and doubts: twenty-nine words; for a correction four, low-pass filters and features. A pause; strain, rate,
+    // their variances; rest reading.
     let correction = filter.correction.as_ref().map_or(0, |_| 4 + TIME_CONSTANTS_S.len() + FEATURES);
     FLOAT * (words + 29 + correction + 7)
 }

@@ -1,4 +1,4 @@
-//! A sensor's filter as source code, chosen and described: what a page and a notebook ask for.
+//! A sensor's filter as source code, chosen and described; used by the page and by notebooks.
 
 use ohmstrain_sensor::SensorParams;
 
@@ -14,7 +14,7 @@ pub struct Firmware {
 }
 
 impl Firmware {
-    /// Exports the filter of a sensor whose readings come every `dt_s` seconds: all of it, or what [`first_fitting`] chooses.
+    /// Exports the filter of a sensor with readings every `dt_s` seconds: the whole filter, or the choice of [`first_fitting`].
     ///
     /// # Errors
     /// See [`ExportError`].

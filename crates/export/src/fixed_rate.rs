@@ -14,13 +14,13 @@ use super::steps::StepTable;
 use super::twin::parts::{Numbers, Parts, filter_parts};
 use super::{ExportError, parameter};
 
-/// A filter in single precision, with what the numbers of states in its type are made for.
+/// A filter in single precision, with the parts that depend on the number of states.
 pub struct FixedRate<'a, const B: usize, const N: usize> {
-    /// The model in double precision, for simulation and to see what rounding does.
+    /// The model in double precision, for simulation and to measure rounding errors.
     pub reference: SwitchedModel<f64, B, N>,
     /// The model in single precision.
     pub model: SwitchedModel<f32, B, N>,
-    /// Number of hypotheses that it keeps; 1 if it keeps none.
+    /// Number of hypotheses that it keeps; 1 for a single Gaussian.
     pub hypotheses: usize,
     /// All other parts.
     pub parts: Parts<'a>,
@@ -66,28 +66,28 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
         let kernel = |step_s| SparseEkf::<f64, Compact, B, N>::new(reference, step_s).map_err(parameter);
         let numbers = |step_s| exact_numbers(&reference, phases, step_s).map_err(parameter);
         let table = StepTable::new(usual_s, &kernel(usual_s)?.step_names(), numbers)?;
-        // Not longer than the table either.
+        // Not longer than the table allows.
         parts.live.longest_step_s = f64::from((longest_s.min(table.range.1) / STEP_GRACE) as f32);
         Ok(Self { reference, model, hypotheses: filter.hypotheses, parts, table })
     }
 
-    /// Its surroundings in single precision.
+    /// Converts its surroundings to single precision.
     pub fn narrow(&self) -> LiveParts<f32, ()> {
         self.parts.live.to()
     }
 
-    /// R₀ where the rested sensor reads this today.
+    /// Returns R₀ if the rested sensor reads `measured` today.
     pub fn rest_reading_at(&self, measured: f32) -> f32 {
         let LiveParts { rest_reading, rested, .. } = self.narrow();
         rest_reading * (measured / rested)
     }
 
-    /// True if a sensor that has just been rested may be unstretched.
+    /// True if a rested sensor can have zero strain.
     pub fn rests_at_zero(&self) -> bool {
         may_be_unstretched(&self.narrow().limits)
     }
 
-    /// Length of the last step that the usual time between readings is divided into, s.
+    /// Returns the length of the last step into which the usual time between readings is divided, s.
     pub fn usual_step_s(&self) -> f32 {
         let LiveParts { longest_step_s, dt_s, .. } = self.narrow();
         let mut pause = Pause::none(longest_step_s).after(dt_s);
@@ -95,14 +95,14 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
         pause.last_steps().1
     }
 
-    /// Lengths of the whole steps of a pause, s.
+    /// Returns the lengths of the whole steps of a pause, s.
     pub fn whole_steps_s(&self) -> Vec<f32> {
         let growth = STEP_GROWTH as f32;
         let lengths = std::iter::successors(Some(self.narrow().longest_step_s), |length_s| Some(length_s * growth));
         lengths.take_while(|length_s| f64::from(*length_s) < LONGEST_PAUSE_S).collect()
     }
 
-    /// Constants that depend on the length of a step, as the exported program has them.
+    /// Returns the constants that depend on the length of a step, as the exported program interpolates them.
     pub fn interpolated(&self) -> Numbers<'_, f32> {
         let known: Vec<(f32, Vec<f32>)> = [self.usual_step_s(), 0.0]
             .into_iter()
@@ -116,7 +116,7 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
         Numbers { of: Box::new(of), length_s: |dt_s| dt_s }
     }
 
-    /// Returns the numbers in double precision, with the law's own, for lengths to a nanosecond, as in the library.
+    /// Returns the numbers in double precision, computed by the law, for lengths rounded to a nanosecond, as in the library.
     pub fn exact(&self) -> Numbers<'_, f64> {
         let of = |step_s| {
             let numbers = exact_numbers(&self.reference, self.parts.phases, step_s);
@@ -125,14 +125,14 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
         Numbers { of: Box::new(of), length_s: |dt_s| (dt_s * 1e9).round() * 1e-9 }
     }
 
-    /// Constants that depend on the length of a step, s, rounded.
+    /// Computes the constants for a step of `step_s` seconds, rounded.
     pub fn numbers_at(&self, step_s: f32) -> Vec<f32> {
         let numbers = exact_numbers(&self.reference, self.parts.phases, step_s.into());
         numbers.map_or_else(|_| self.table.at(step_s), |all| all.iter().map(|x| *x as f32).collect())
     }
 }
 
-/// Numbers of the kernel, and of the chain, for steps of a length.
+/// Computes the numbers of the kernel, and of the chain, for steps of a length.
 fn exact_numbers<const B: usize, const N: usize>(
     model: &SwitchedModel<f64, B, N>,
     phases: Option<PhaseParams>,
@@ -150,7 +150,7 @@ fn exact_numbers<const B: usize, const N: usize>(
     Ok(numbers)
 }
 
-/// The longest step over which a prediction is as good as many short ones, s.
+/// Returns the longest step over which a prediction is as good as many short ones, s.
 pub(super) fn longest_step_s<const B: usize, const N: usize, const L: usize>(
     model: &SwitchedModel<f64, B, N>,
     parts: &Parts<'_>,

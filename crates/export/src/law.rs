@@ -1,4 +1,4 @@
-//! Law, noise and motion as they were calibrated, in single precision.
+//! Law, noise and motion from the calibration, in single precision.
 
 use ohmstrain_model::{Branch, Gauge, ModelNoise, SensorLaw, StrainRange};
 use ohmstrain_sensor::{MotionParams, PhaseParams};
@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::literal::Literal;
 
-/// The law as it was calibrated.
+/// The calibrated law.
 #[derive(Debug, Serialize)]
 pub struct LawConstants {
     gauge: GaugeConstants,
@@ -16,7 +16,7 @@ pub struct LawConstants {
     range_upper: Literal,
 }
 
-/// A branch as it was calibrated; gains and their growth with strain.
+/// A calibrated branch; gains and their growth with strain.
 #[derive(Debug, Serialize)]
 pub struct BranchConstants {
     tau_s: Literal,
@@ -33,7 +33,7 @@ pub enum GaugeConstants {
     Tunnelling { gap: Literal, barrier: Literal, path_loss: Literal },
 }
 
-/// The noise as it was calibrated.
+/// The calibrated noise.
 #[derive(Debug, Serialize)]
 pub struct NoiseConstants {
     reading_sd: Literal,
@@ -42,7 +42,7 @@ pub struct NoiseConstants {
     baseline_time_s: Literal,
 }
 
-/// The motion as it was calibrated.
+/// The calibrated motion.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct PriorConstants {
     rate_time_s: Literal,
@@ -51,7 +51,7 @@ pub struct PriorConstants {
     strain_sd: Literal,
 }
 
-/// Phases as they were calibrated.
+/// The calibrated phases.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct PhaseConstants {
     hold_time_s: Literal,
@@ -115,7 +115,7 @@ impl PriorConstants {
         }
     }
 
-    /// Correlation time of the rate, its deviation, mean and deviation of strain.
+    /// Returns the correlation time of the rate, its deviation, and mean and deviation of strain.
     pub fn numbers(&self) -> [f32; 4] {
         [self.rate_time_s, self.rate_sd_per_s, self.strain_mean, self.strain_sd].map(|literal| literal.0)
     }

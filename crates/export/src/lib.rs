@@ -77,24 +77,24 @@ pub struct SourceFile {
 pub const FILTERS: [EstimatorKind; 4] =
     [EstimatorKind::Corrected, EstimatorKind::SignSplit, EstimatorKind::Hypotheses, EstimatorKind::Ekf];
 
-/// Reason for having no source code.
+/// Reason why there is no source code.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
-    /// The sensor has something that the exported filter has no form for.
+    /// The sensor has a part without an exported form.
     #[error("{what}; {instead}")]
     Unsupported {
         /// The part of the sensor.
         what: String,
-        /// Way to a sensor file without it.
+        /// Way to obtain a sensor file without it.
         instead: &'static str,
     },
     /// A parameter that `f32`, or the filter, cannot work with.
     #[error("{0}")]
     Parameter(String),
-    /// The interval does not go with the sensor.
+    /// The interval does not suit the sensor.
     #[error("{0}")]
     Interval(String),
-    /// Nothing is small enough.
+    /// Even the smallest filter does not fit.
     #[error(
         "nothing fits; the smallest filter of this sensor takes about {} instructions a step, {} B of flash and {} B of RAM: {lacks}",
         least.instructions, least.flash, least.ram()
@@ -102,7 +102,7 @@ pub enum ExportError {
     Budget {
         /// Cost of the smallest filter.
         least: Cost,
-        /// Resource that it takes too much of.
+        /// Resource that it exceeds.
         lacks: String,
     },
     /// The template failed.
@@ -110,12 +110,12 @@ pub enum ExportError {
     Template(#[from] minijinja::Error),
 }
 
-/// A number that the filter cannot work with.
+/// Creates the error of a number that the filter refuses.
 fn parameter(error: impl ToString) -> ExportError {
     ExportError::Parameter(error.to_string())
 }
 
-/// A law that no filter is made for.
+/// Creates the error of a law without a filter for its number of branches.
 fn too_many_branches() -> ExportError {
     ExportError::Unsupported {
         what: "the law has more than four branches".into(),
@@ -126,8 +126,8 @@ fn too_many_branches() -> ExportError {
 /// Name in the exported folder, and template.
 type Template = (&'static str, &'static str);
 
-/// The layout of an Arduino library, which PlatformIO takes too: of it only `src` is compiled into a program, not the self-test
-/// with its `main`.
+/// Layout of an Arduino library, which PlatformIO accepts, too: only `src` is compiled into a program, not the self-test with
+/// its `main`.
 const C: [Template; 11] = [
     ("src/ohmstrain.h", include_str!("templates/ohmstrain.h")),
     ("src/ohmstrain.c", include_str!("templates/ohmstrain.c")),
@@ -152,7 +152,7 @@ const C_PARTS: [Template; 3] = [
 const RUST: [Template; 2] =
     [("sensor.rs", include_str!("templates/sensor.rs")), ("README.md", include_str!("templates/readme_rust.md"))];
 
-/// The files of a sensor whose readings come every `dt_s` seconds; the header repeats what was promised of it.
+/// Returns the files of a sensor with readings every `dt_s` seconds; the header repeats its promise.
 ///
 /// # Errors
 /// See [`ExportError`].
@@ -170,7 +170,7 @@ pub fn files(
         ExportTarget::Rust => &RUST,
     };
     let mut environment = Environment::new();
-    // C is full of double braces.
+    // C contains many double braces.
     let syntax = SyntaxConfig::builder()
         .variable_delimiters("<<", ">>")
         .trim_blocks(true)

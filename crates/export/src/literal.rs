@@ -7,7 +7,7 @@ use serde::{Serialize, Serializer};
 pub struct Literal(pub f32);
 
 impl Literal {
-    /// The number as text, without a suffix.
+    /// Returns the number as text, without a suffix.
     pub fn text(self) -> String {
         format!("{:?}", self.0)
     }
@@ -15,7 +15,7 @@ impl Literal {
 
 impl Serialize for Literal {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        // What is no number would not compile, or worse.
+        // A number that is not finite would not compile, or worse.
         if !self.0.is_finite() {
             return Err(S::Error::custom(format_args!("a number of the sensor is {:?} in single precision", self.0)));
         }
@@ -23,7 +23,7 @@ impl Serialize for Literal {
     }
 }
 
-/// Several of them.
+/// Converts several numbers.
 pub fn literals<'a>(values: impl IntoIterator<Item = &'a f32>) -> Vec<Literal> {
     values.into_iter().copied().map(Literal).collect()
 }

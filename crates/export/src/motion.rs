@@ -1,4 +1,4 @@
-//! A short motion and the readings that a sensor's law gives for it.
+//! A short motion, and its readings by a sensor's law.
 
 use ohmstrain_model::{Phase, SensorLaw};
 use rand_chacha::ChaCha8Rng;
@@ -11,18 +11,18 @@ const CORNERS: [(usize, f64); 7] =
 
 /// Rows without a reading: one alone, and a gap.
 const MISSING: [std::ops::Range<usize>; 2] = [60..61, 170..175];
-/// Rows whose reading brings noise of its own.
+/// Rows whose reading has additional noise.
 const NOISY: std::ops::Range<usize> = 120..130;
 
 /// One row.
 pub struct MotionRow {
     /// R/R₀ - 1; `None` if it is missing.
     pub rho: Option<f64>,
-    /// Standard deviation that the reading brings along, relative to R₀.
+    /// Standard deviation of the reading's additional noise, relative to R₀.
     pub extra_sd: f64,
 }
 
-/// The rows of the motion, with white noise of `reading_sd` from a seed.
+/// Returns the rows of the motion, with white noise of `reading_sd` from a seed.
 pub fn rows<const B: usize>(law: &SensorLaw<f64, B>, dt_s: f64, reading_sd: f64, seed: u64) -> Vec<MotionRow> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut relaxation = [0.0; B];

@@ -2,8 +2,8 @@
 
 use ohmstrain_sensor::{RecordingInfo, SensorParams};
 
-/// Usual time between two rows of the recordings that a sensor was calibrated on, s, to six digits: the median of the recordings'
-/// means. `None` if the sensor names no recording.
+/// Returns the usual time between two rows of the recordings that a sensor was calibrated on, s, rounded to six digits: the
+/// median of the recordings' means. `None` if the sensor names no recording.
 pub fn usual_step_s(params: &SensorParams) -> Option<f64> {
     median(params.recordings.iter().filter_map(mean_step_s).collect())
 }
@@ -15,7 +15,7 @@ fn mean_step_s(recording: &RecordingInfo) -> Option<f64> {
 
 fn median(mut steps_s: Vec<f64>) -> Option<f64> {
     steps_s.sort_by(f64::total_cmp);
-    // Times have been subtracted: further digits are rounding.
+    // Times are differences, so that further digits are rounding errors.
     format!("{:.5e}", steps_s.get(steps_s.len() / 2)?).parse().ok()
 }
 

@@ -1,4 +1,4 @@
-//! Plan of an exported filter: all of the sensor's, or less for a small chip.
+//! Plan of an exported filter: the sensor's whole filter, or a part of it for a small chip.
 
 use ohmstrain_sensor::{EstimatorKind, HYPOTHESES, PortableFilter, SensorParams};
 
@@ -17,19 +17,19 @@ pub struct Plan {
     pub rows: Option<RowBudget>,
 }
 
-/// A filter as it goes onto a chip.
+/// A filter in the form that is put onto a chip.
 pub struct ChipFilter {
-    /// The filter, with as many hypotheses and rows as are left.
+    /// The filter, with the remaining hypotheses and rows.
     pub filter: PortableFilter,
     /// Stand-in for the other rows, of the direct and of the residual process.
     pub quadratics: Option<[OwnedQuadratic; 2]>,
 }
 
 impl ChipFilter {
-    /// A sensor's filter, as far as it is exported.
+    /// Creates the filter of a sensor, restricted to the plan.
     ///
     /// # Errors
-    /// If the sensor has no parameters for it, or its correction cannot do with fewer rows.
+    /// If the sensor has no parameters for it, or its correction cannot be reduced.
     pub fn new(params: &SensorParams, plan: &Plan) -> Result<Self, ExportError> {
         let mut filter = PortableFilter::new(params, plan.kind).map_err(parameter)?;
         if filter.kind != EstimatorKind::Ekf {
@@ -44,13 +44,13 @@ impl ChipFilter {
         Ok(Self { filter, quadratics })
     }
 
-    /// True if it is less than what a computer runs.
+    /// True if it is reduced against the filter on a computer.
     pub fn is_smaller(&self) -> bool {
         let has_fewer = self.filter.kind != EstimatorKind::Ekf && self.filter.hypotheses < HYPOTHESES;
         has_fewer || self.quadratics.is_some()
     }
 
-    /// The plan in words.
+    /// Describes the plan.
     pub fn words(&self) -> String {
         let name = self.filter.kind.name();
         let filter = match self.filter.hypotheses {

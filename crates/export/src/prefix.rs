@@ -1,10 +1,10 @@
 use std::str::FromStr;
 
-/// Prefix of the names in exported C code: two sensors in one program have names of their own.
+/// Prefix of the names in exported C code, so that two sensors in one program have different names.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Prefix(String);
 
-/// Prefix that the templates are written with.
+/// Prefix used in the templates.
 const WRITTEN: &str = "ohmstrain";
 
 impl Default for Prefix {
@@ -28,7 +28,7 @@ impl FromStr for Prefix {
 }
 
 impl Prefix {
-    /// A text, or a file's name, with this prefix for the one that templates are written with.
+    /// Replaces the prefix of the templates in a text or a file's name by this one.
     pub fn put_into(&self, text: &str) -> String {
         let Self(prefix) = self;
         if prefix == WRITTEN {

@@ -28,7 +28,8 @@ pub struct Promise {
 }
 
 impl Promise {
-    /// Collects what is known of a plan at readings every `dt_s` seconds: on a recording, and on the board of a budget, if there are any.
+    /// Collects errors and costs of a plan for readings every `dt_s` seconds, also on a recording and on the board of a budget,
+    /// if given.
     ///
     /// # Errors
     /// See [`ExportError`].
@@ -69,7 +70,7 @@ impl Promise {
     }
 }
 
-/// Errors that calibration found, of the filter or of the sensor's default one, and of a static cubic.
+/// Returns the errors found in calibration, of the filter or of the sensor's default one, and of a static cubic.
 fn errors(params: &SensorParams, is_default: bool) -> Vec<(String, [String; 2])> {
     let whose = if is_default { "" } else { " of the default" };
     let of_95 = |error: f64, percent: f64| [format!("{error:.2}"), format!("-/-/{percent:.0}")];
@@ -88,7 +89,7 @@ fn errors(params: &SensorParams, is_default: bool) -> Vec<(String, [String; 2])>
     rows
 }
 
-/// Error, percent of full scale, and coverages, percent; none of these without an interval.
+/// Formats the error, percent of full scale, and the coverages, percent; no coverages without an interval.
 fn of_all(scores: &Scores) -> [String; 2] {
     let shares = [scores.coverage_50, scores.coverage_90, scores.coverage_95];
     let known: Vec<String> = shares.into_iter().flatten().map(|share| format!("{:.0}", 100.0 * share)).collect();

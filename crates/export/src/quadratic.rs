@@ -1,4 +1,4 @@
-//! Quadratic function of a correction's inputs: most of a smooth Gaussian process, at little cost.
+//! Quadratic function of a correction's inputs, which approximates a smooth Gaussian process at low cost.
 
 use nalgebra::{DMatrix, DVector};
 use ohmstrain_ekf::correction::Quadratic;
@@ -19,10 +19,10 @@ impl<T> OwnedQuadratic<T> {
     }
 }
 
-/// Share of a column's mean square that keeps the equations regular.
+/// Ridge that keeps the equations regular, as a share of a column's mean square.
 const RIDGE: f64 = 1e-5;
 
-/// A constant, a quadratic function and weights of further columns that come closest to values at points.
+/// Least-squares fit of values at points by a constant, a quadratic function and weighted further columns.
 pub struct Fit {
     pub constant: f64,
     pub quadratic: OwnedQuadratic,
@@ -30,7 +30,7 @@ pub struct Fit {
 }
 
 impl Fit {
-    /// Weighted least squares; none if the equations are singular.
+    /// Solves the weighted least squares; `None` if the equations are singular.
     pub fn new(points: &[&[f64]], columns: &DMatrix<f64>, values: &DVector<f64>, weights: &[f64]) -> Option<Self> {
         let inputs = points.first()?.len();
         let monomials: Vec<Vec<f64>> = points.iter().map(|x| monomials(x)).collect();
@@ -39,7 +39,7 @@ impl Fit {
         let design = DMatrix::from_fn(points.len(), count + columns.ncols(), |i, j| weights[i].sqrt() * entry(i, j));
         let target = DVector::from_fn(points.len(), |i, _| weights[i].sqrt() * values[i]);
         let mut normal = design.tr_mul(&design);
-        // Columns of an input that never changes are zero.
+        // Columns of a constant input are zero.
         let least = f64::EPSILON * normal.diagonal().max();
         for i in 0..normal.nrows() {
             normal[(i, i)] += RIDGE * normal[(i, i)] + least;
@@ -51,7 +51,7 @@ impl Fit {
     }
 }
 
-/// 1, x, and the products of the lower triangle.
+/// Returns 1, x, and the products of the lower triangle.
 fn monomials(x: &[f64]) -> Vec<f64> {
     let products = x.iter().enumerate().flat_map(|(i, a)| x[..=i].iter().map(move |b| a * b));
     std::iter::once(1.0).chain(x.iter().copied()).chain(products).collect()

@@ -1,10 +1,10 @@
-//! A learned correction with fewer rows: from the sensor's file alone, nothing is learned again.
+//! A learned correction with fewer rows, computed from the sensor's file alone, without learning again.
 //!
-//! The mean of a process with a long length scale is nearly quadratic within the range of its rows. So the means become a
-//! quadratic function and kernels of the most informative rows (the first ones: a correction lists its inducing rows first, in
-//! the order of a pivoted Cholesky decomposition), fitted to the processes' own means. Variances take the kernels of
-//! fewer inducing rows, onto which those of the others are projected, as the others are projected already (Nyström). The process of
-//! simulated rows is left out.
+//! The mean of a process with a long length scale is nearly quadratic within the range of its rows. Therefore the means are
+//! replaced by a quadratic function and kernels of the most informative rows, fitted to the processes' own means. These are the
+//! first rows, since a correction lists its inducing rows first, in the order of a pivoted Cholesky decomposition. Variances
+//! use the kernels of fewer inducing rows; the others are projected onto them (Nyström), as all rows are projected already. The
+//! process of simulated rows is left out.
 
 use nalgebra::{DMatrix, DVector};
 use ohmstrain_ekf::correction::{self, FILTER_INPUTS, OUTPUTS, kernel};
@@ -16,16 +16,16 @@ type Row = [f64; FILTER_INPUTS];
 type Correction = OwnedCorrection<f64, FILTER_INPUTS>;
 type Process = OwnedProcess<f64, FILTER_INPUTS>;
 
-/// Means are fitted in the rows, half-way to these of the nearest others, and from these as far beyond the row.
+/// Points of the fit of the means: the rows, points half-way to these nearest other rows, and points as far beyond the row.
 const BETWEEN: [usize; 4] = [1, 2, 4, 8];
 const BEYOND: [usize; 2] = [2, 5];
 const AS_FAR: f64 = 0.7;
-/// Weight of rows whose inputs are mixed from other rows': within the range of the rows, unlike any row that was seen.
+/// Weight of points with inputs mixed from several rows: within the range of the rows, but unlike any observed row.
 const MIXED_WEIGHT: f64 = 0.03;
 const MIXED: [usize; 2] = [1, 2];
-/// A prime: other inputs come from far apart rows.
+/// Distance of the rows that inputs are mixed from; a prime.
 const APART: usize = 17;
-/// Keeps kernels of inducing rows regular; less than the processes' own jitter.
+/// Jitter that keeps kernels of inducing rows regular; less than the processes' own.
 const JITTER: f64 = 1e-8;
 
 /// Choice between the two processes.
@@ -43,7 +43,7 @@ impl Which {
         }
     }
 
-    /// The input on which the linear part of the kernel depends.
+    /// Returns the index of the input on which the linear part of the kernel depends.
     fn first(self) -> usize {
         match self {
             Self::Direct => OUTPUTS,
@@ -52,7 +52,7 @@ impl Which {
     }
 }
 
-/// Number of rows of a correction that are left.
+/// Number of rows that a reduced correction keeps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RowBudget {
     /// Rows for its means, beside a quadratic function.
@@ -61,7 +61,8 @@ pub struct RowBudget {
     pub variance: usize,
 }
 
-/// The correction with no more than these rows, and what stands for the others; none if kernels are singular.
+/// Returns the correction with at most these rows, and the quadratic functions that replace the others; `None` if kernels are
+/// singular.
 pub fn reduced(full: &Correction, to: RowBudget) -> Option<(Correction, [OwnedQuadratic; 2])> {
     let inducing = full.direct.explained.side().min(full.residual.explained.side());
     let rows = to.mean.max(to.variance).min(inducing).max(1);
@@ -93,7 +94,7 @@ fn process(
     Some((process, fit.quadratic))
 }
 
-/// Kernels of two lists of rows.
+/// Computes the kernels of two lists of rows.
 fn kernels(of: &Process, which: Which, a: &[&Row], b: &[&Row]) -> DMatrix<f64> {
     let first = which.first();
     DMatrix::from_fn(a.len(), b.len(), |i, j| {
@@ -103,7 +104,7 @@ fn kernels(of: &Process, which: Which, a: &[&Row], b: &[&Row]) -> DMatrix<f64> {
     })
 }
 
-/// Part of the variance that the first few inducing rows explain.
+/// Returns the triangle of the variance that the first few inducing rows explain.
 fn explained(full: &Process, which: Which, rows: &[&Row], few: usize) -> Option<OwnedTriangle<f64>> {
     let inducing = full.explained.side();
     let triangle = DMatrix::from_row_iterator(inducing, inducing, full.explained.rows().into_iter().flatten());
@@ -114,7 +115,7 @@ fn explained(full: &Process, which: Which, rows: &[&Row], few: usize) -> Option<
     Some(OwnedTriangle::new(few, |i, j| triangle[(i, j)]))
 }
 
-/// Returns the points at which means are to be right, with their weights.
+/// Returns the points at which the means are fitted, with their weights.
 fn points(rows: &[Row]) -> Vec<(Row, f64)> {
     let range: [(f64, f64); FILTER_INPUTS] = std::array::from_fn(|i| {
         let column = rows.iter().map(|row| row[i]);
@@ -138,7 +139,7 @@ fn points(rows: &[Row]) -> Vec<(Row, f64)> {
     points
 }
 
-/// All rows, the nearest first.
+/// Returns all rows, the nearest first.
 fn nearest(rows: &[Row], to: &Row) -> Vec<usize> {
     let square = |k: usize| -> f64 { rows[k].iter().zip(to).map(|(a, b)| (a - b).powi(2)).sum() };
     let mut order: Vec<(f64, usize)> = (0..rows.len()).map(|k| (square(k), k)).collect();

@@ -1,4 +1,4 @@
-//! A recording through the exported program's twin.
+//! Replay of a recording by the exported program's twin.
 
 use ohmstrain_ekf::live::{LiveEstimate, Protections, SensorEstimator};
 use ohmstrain_ekf::{Real, StepError};
@@ -11,11 +11,11 @@ use super::{ExportError, too_many_branches};
 
 /// A row of a recording; a missing reading is NaN.
 pub struct ReplayedRow {
-    /// Time since the row before, or of the first one since the start, s.
+    /// Time since the previous row, s; for the first row since the start.
     pub since_s: f32,
     /// The reading, in the sensor's unit.
     pub reading: f64,
-    /// The deviation that its electronics add, in the same unit.
+    /// Standard deviation that the electronics add, in the same unit.
     pub reading_sd: f64,
 }
 

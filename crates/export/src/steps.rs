@@ -1,31 +1,31 @@
-//! Constants of steps of several lengths: tabulated, since clocks jitter and readings get lost.
+//! Constants of steps of several lengths: tabulated, since clocks jitter and readings are lost.
 
 use ohmstrain_ekf::Real;
 
-/// Lengths at which the numbers are tabulated.
+/// Number of lengths at which the numbers are tabulated.
 pub const NODES: usize = 9;
-/// The shortest and the longest step, in usual ones.
+/// Shortest and longest step, in multiples of the usual one.
 const SHORTEST: f64 = 1.0 / 16.0;
 const LONGEST: f64 = 2.0;
 
-/// Numbers of a step as functions of its length: polynomials through Chebyshev nodes. They are exponentials of the length over
-/// time constants that it is no longer than, or so: interpolated to single precision.
+/// Numbers of a step as functions of its length: polynomials through Chebyshev nodes. The functions are exponentials of the
+/// length over time constants that it hardly exceeds; interpolation is accurate to single precision.
 #[derive(Clone, Debug)]
 pub struct StepTable {
     /// Shortest and longest length, s.
     pub range: (f64, f64),
     /// The nodes, from -1 to 1 over that range.
     pub nodes: [f64; NODES],
-    /// One over the product of a node's distances from the others.
+    /// Reciprocal of the product of a node's distances from the others.
     pub inverses: [f64; NODES],
     /// The numbers at each node.
     pub rows: Vec<Vec<f64>>,
-    /// Numbers that are one over another one: their places.
+    /// Index pairs of numbers of which one is the reciprocal of the other.
     pub reciprocals: Vec<(usize, usize)>,
 }
 
 impl StepTable {
-    /// Around a usual length, s. `numbers` of a length; `names` as `step_names` has them.
+    /// Tabulates the numbers around a usual length, s; `numbers` computes them for a length, `names` are those of `step_names`.
     pub fn new<E>(usual_s: f64, names: &[String], numbers: impl Fn(f64) -> Result<Vec<f64>, E>) -> Result<Self, E> {
         let range = (SHORTEST * usual_s, LONGEST * usual_s);
         let angle = |j: usize| std::f64::consts::PI * (j as f64 + 0.5) / NODES as f64;
@@ -41,7 +41,7 @@ impl StepTable {
         Ok(Self { range, nodes, inverses, rows: rows?, reciprocals: reciprocals.collect() })
     }
 
-    /// The numbers of a step of `dt_s`, as the exported program computes them.
+    /// Computes the numbers of a step of `dt_s` as the exported program does.
     pub fn at<T: Real>(&self, dt_s: T) -> Vec<T> {
         let number = |x: f64| T::of(f64::from(x as f32));
         let (lower, upper) = (number(self.range.0), number(self.range.1));
@@ -68,8 +68,8 @@ impl StepTable {
 mod tests {
     use super::StepTable;
 
-    /// Exponentials of up to a time constant a step, and what goes with a power of the length, to single precision of the
-    /// largest; a reciprocal to its own.
+    /// Tests exponentials of up to a time constant per step, and powers of the length, to single precision of the largest; a
+    /// reciprocal to its own precision.
     #[test]
     fn numbers_between_the_nodes_are_those_of_the_functions() {
         let functions = |t: f64| [(-t).exp(), -(-t).exp_m1(), t * t * t, t, 1.0 / t];
@@ -80,7 +80,7 @@ mod tests {
             let t = 0.5 / 16.0 + (1.0 - 0.5 / 16.0) * f64::from(k) / 199.0;
             let exact = functions(f64::from(t as f32));
             for (k, (found, exact)) in table.at(t as f32).into_iter().zip(exact).enumerate() {
-                // Nine products with weights of up to three in all, each with roundings of its own.
+                // Nine products with weights of up to three in total, each with its own rounding.
                 let size = if k == 4 { exact * exact } else { 1.0 };
                 assert!((f64::from(found) - exact).abs() < 2e-6 * size, "{}: {found} {exact} at {t}", names[k]);
             }

@@ -1,4 +1,4 @@
-//! Output of the Rust filters over a short motion, which the exported filter must have too.
+//! Test vectors: output of the Rust filters over a short motion, which the exported filter must reproduce.
 
 use ohmstrain_ekf::live::SensorEstimator;
 use ohmstrain_ekf::{Reading, Real, StepError};
@@ -13,14 +13,14 @@ use super::literal::Literal;
 use super::motion;
 use super::twin::{StepNumbers, Task, TwinFilter, with_twin};
 
-/// Readings and results, and how far other results may be off.
+/// Readings, results, and their tolerances.
 #[derive(Debug, Serialize)]
 pub struct Vectors {
     seed: u64,
     ulp: Literal,
     tolerance_ulp: u64,
     rows: Vec<Vector>,
-    /// The row before which the sensor is found to rest, and what it reads then.
+    /// Row before which the sensor is found at rest, and its reading then.
     rezeroed: usize,
     rested: Literal,
     #[serde(skip)]
@@ -36,49 +36,49 @@ struct Vector {
     strain_sd: Literal,
 }
 
-/// A row as the microcontroller gets it.
+/// A row as the microcontroller receives it.
 #[derive(Clone, Copy)]
 pub struct Input {
     pub reading: Option<f32>,
     pub reading_sd: f32,
 }
 
-/// Work of a step, on average.
+/// Mean work of a step.
 #[derive(Clone, Copy, Debug)]
 pub struct Work {
-    /// Hypotheses updated: 1 for a single Gaussian; a surprising reading counts twice.
+    /// Number of hypotheses updated: 1 for a single Gaussian; a surprising reading counts twice.
     pub updated: f64,
-    /// Hypotheses predicted without a reading.
+    /// Number of hypotheses predicted without a reading.
     pub predicted: f64,
 }
 
-/// Rows at the end for which the sensor rests, and what it reads then over what it read in calibration: another day.
+/// Number of rows at the end in which the sensor rests, and its reading then relative to that in calibration: another day.
 const RESTED: usize = 20;
 const ANOTHER_DAY: f32 = 1.08;
 
-/// Factor by which another filter may be further from exact arithmetic than Rust's `f32` filter, or than other roundings of the
-/// readings move that.
+/// Factor by which another filter may be further from exact arithmetic than Rust's `f32` filter is, or than other roundings of
+/// the readings move it.
 const FURTHER: f64 = 3.0;
 
-/// Seed of the noise, and the most that are tried.
+/// Seed of the noise, and the largest number of seeds that are tried.
 const FIRST_SEED: u64 = 1;
 const SEEDS: u64 = 8;
 
-/// Runs with readings rounded otherwise, and the relative deviation of that: more than C libraries differ by, so that a decision close
-/// to a tie is found.
+/// Number of runs with other roundings of the readings, and their relative deviation: larger than the differences between C
+/// libraries, so that a decision close to a tie is found.
 const ROUNDINGS: u64 = 6;
 const ROUNDED_BY: f64 = 2.0 * f32::EPSILON as f64;
 
-/// Share of the mean deviation that rounding may make: beyond it, it decides what hypotheses are merged.
+/// Largest effect of rounding, as a share of the mean deviation; beyond it, rounding decides which hypotheses are merged.
 const CALM: f64 = 1e-3;
 
-/// Strain and deviation of each row, with what rounding makes of them.
+/// Strain and deviation of each row, with the effect of rounding.
 struct Run {
     seed: u64,
     inputs: Vec<Input>,
     estimates: Vec<(f32, f32)>,
     work: Work,
-    /// The largest difference that rounding makes.
+    /// Largest effect of rounding.
     rounding: f64,
 }
 
@@ -101,7 +101,7 @@ impl Run {
             MotionRun { sensor, inputs: &inputs },
         )?;
         let mut rounding = farthest(&estimates, exact.into_iter());
-        // The distance from exact arithmetic may be small by chance.
+        // The distance from exact arithmetic can be small by chance.
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         for _ in 0..ROUNDINGS {
             let mut rounded = |reading: f32| {
@@ -116,14 +116,14 @@ impl Run {
         Ok(Self { seed, inputs, estimates, work, rounding })
     }
 
-    /// True if rounding makes no difference that matters.
+    /// True if rounding has no relevant effect.
     fn is_calm(&self) -> bool {
         let sd = self.estimates.iter().map(|(_, sd)| f64::from(*sd)).sum::<f64>() / self.estimates.len() as f64;
         self.rounding < CALM * sd
     }
 }
 
-/// The largest difference of strains, or of deviations.
+/// Returns the largest difference of strains, or of deviations.
 fn farthest(estimates: &[(f32, f32)], others: impl Iterator<Item = (f64, f64)>) -> f64 {
     let off = |(&(strain, sd), other): (&(f32, f32), (f64, f64))| {
         (f64::from(strain) - other.0).abs().max((f64::from(sd) - other.1).abs())
@@ -132,7 +132,8 @@ fn farthest(estimates: &[(f32, f32)], others: impl Iterator<Item = (f64, f64)>) 
 }
 
 impl Vectors {
-    /// Runs the filters through a motion whose noise leaves no decision to rounding; if none does, through the one that rounding changes least.
+    /// Runs the filters through a motion whose noise leaves no decision to rounding; if there is none, through the one with the
+    /// smallest effect of rounding.
     pub fn new<const B: usize, const N: usize, const L: usize>(
         sensor: &FixedRate<'_, B, N>,
     ) -> Result<Self, ExportError> {
@@ -167,7 +168,7 @@ impl Vectors {
     }
 }
 
-/// Work of a step of the motion.
+/// Computes the work of a step of the motion.
 pub fn work<const B: usize, const N: usize, const L: usize>(sensor: &FixedRate<'_, B, N>) -> Result<Work, ExportError> {
     let inputs = readings(sensor, FIRST_SEED);
     let motion = MotionRun { sensor, inputs: &inputs };
@@ -176,7 +177,7 @@ pub fn work<const B: usize, const N: usize, const L: usize>(sensor: &FixedRate<'
     Ok(work)
 }
 
-/// The readings of the motion, in the sensor's unit.
+/// Returns the readings of the motion, in the sensor's unit.
 fn readings<const B: usize, const N: usize>(sensor: &FixedRate<'_, B, N>, seed: u64) -> Vec<Input> {
     let rest = sensor.parts.live.rest_reading;
     let input = |row: motion::MotionRow| Input {
@@ -187,26 +188,26 @@ fn readings<const B: usize, const N: usize>(sensor: &FixedRate<'_, B, N>, seed: 
     let dt_s = sensor.parts.live.dt_s;
     let mut inputs: Vec<Input> =
         motion::rows(sensor.reference.law(), dt_s, reading_sd, seed).into_iter().map(input).collect();
-    // It wanders, so that no number comes twice.
+    // It wanders, so that no number repeats.
     let wandering = |row: usize| 1.0 + reading_sd * (row as f64).sin();
     let rested = f64::from(rested_elsewhere(sensor));
     inputs.extend((0..RESTED).map(|row| Input { reading: Some((rested * wandering(row)) as f32), reading_sd: 0.0 }));
     inputs
 }
 
-/// Resistance at rest on another day.
+/// Returns the resistance at rest on another day.
 fn rested_elsewhere<const B: usize, const N: usize>(sensor: &FixedRate<'_, B, N>) -> f32 {
     sensor.narrow().rested * ANOTHER_DAY
 }
 
-/// A row relative to R₀, computed as on the microcontroller.
+/// Converts a row relative to R₀, computed as on the microcontroller.
 fn relative<T: Real>(rest_reading: f32, input: &Input) -> Option<Reading<T>> {
     let (sd, exactly) = (input.reading_sd / rest_reading, |x: f32| T::of(x.into()));
     let value = |reading: f32| exactly((reading - rest_reading) / rest_reading);
     input.reading.map(|reading| Reading { value: value(reading), extra_variance: exactly(sd * sd) })
 }
 
-/// Strain and deviation as they are reported, row by row; the work of a step.
+/// Strain and deviation as reported, row by row; and the work of a step.
 struct MotionRun<'a, const B: usize, const N: usize> {
     sensor: &'a FixedRate<'a, B, N>,
     inputs: &'a [Input],

@@ -10,11 +10,12 @@ use crate::known::in_order;
 use crate::stored::{MadeOf, StoredOptions};
 use crate::{Error, Filter, Known, LaggedFilter, Sensor, Stored, StoredError};
 
-/// Number of readings in a row that a gate rejects before the state is doubted instead: outliers come alone, but a body that sets
-/// off surprises until it is followed. With ten, a knee that bent within half a second was missed.
+/// Number of consecutive readings that a gate may reject; a further one makes the filter doubt its state instead. Outliers come
+/// alone, but a body that starts to move causes surprises until the filter follows. With ten, a knee bend within half a second
+/// was missed.
 const PATIENCE: u32 = 2;
-/// Default influence of a surprising reading. On five public recordings of two materials it costs at most
-/// one hundredth of the error where nothing is wrong (Student's t with four degrees of freedom costs a tenth on two of them).
+/// Default influence of a surprising reading. On five public recordings of two materials it adds at most one hundredth to the
+/// error if nothing is wrong (Student's t with four degrees of freedom adds a tenth on two of them).
 pub(crate) const INFLUENCE: Influence<f64> = Influence::Redescending { threshold: 3.0 };
 
 /// Options of a filter; see [`Sensor::filter`]. Everything has a default.
@@ -62,7 +63,7 @@ impl<'a> FilterBuilder<'a> {
         }
     }
 
-    /// Another estimator than the sensor's default.
+    /// Selects another estimator than the sensor's default.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -104,7 +105,7 @@ impl<'a> FilterBuilder<'a> {
         Self { rest_resistance: Some(measured), ..self }
     }
 
-    /// Strain (or angle) at the first row, if it is known; the body is at rest there.
+    /// Sets the strain (or angle) at the first row, if it is known; the body is at rest there.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -118,8 +119,9 @@ impl<'a> FilterBuilder<'a> {
         Self { initial_strain: Some(strain), ..self }
     }
 
-    /// Strains (or angles) that are known at times, in any order. What the estimates lack then is known, too, of the rows after it (a
-    /// smoother's: around it): for seconds, and for an hour as far as known strains show an offset or another gain.
+    /// Sets strains (or angles) that are known at certain times, in any order. Each shows the error of the estimate at its
+    /// time, which corrects later rows (in a smoother, rows before it, too): for seconds, and for an hour as far as known
+    /// strains show an offset or another gain.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -138,8 +140,8 @@ impl<'a> FilterBuilder<'a> {
         Self { known, ..self }
     }
 
-    /// Turns down readings whose squared innovation over its variance is above `nis`; two in a row at most. 10.8 turns down
-    /// one good reading in a thousand.
+    /// Rejects readings with a NIS (squared innovation over its variance) above `nis`, at most two in a row. A threshold of
+    /// 10.8 rejects one good reading in a thousand.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -169,7 +171,8 @@ impl<'a> FilterBuilder<'a> {
         Self { influence, ..self }
     }
 
-    /// Turns off the plausibility check: every finite reading is used, whatever the calibrated range, and no repeated number is stuck.
+    /// Turns off the plausibility check: every finite reading is used, whatever the calibrated range, and a repeated number
+    /// never counts as stuck.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -186,7 +189,8 @@ impl<'a> FilterBuilder<'a> {
         Self { protections: Protections { plausibility: false, ..self.protections }, ..self }
     }
 
-    /// Turns off the second look after a jump of the readings, which follows the knowledge from before any reading. A smoother never has it.
+    /// Turns off the second look after a jump of the readings, a second hypothesis that starts from the prior. A smoother never
+    /// has one.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -199,8 +203,9 @@ impl<'a> FilterBuilder<'a> {
         Self { protections: Protections { second_look: false, ..self.protections }, ..self }
     }
 
-    /// Intervals as the filter states them: not widened where it has just begun, finds its way back after a fault, or is used
-    /// outside of what calibration has seen, or with another R₀. Smoothers never widen theirs; of these flags they have `long_run`.
+    /// Leaves intervals as the filter states them. They are not widened at the start, in recovery after a fault, outside the
+    /// calibrated range, or with another R₀. A smoother widens its intervals for the same reasons, except at the start and in
+    /// recovery.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -214,10 +219,10 @@ impl<'a> FilterBuilder<'a> {
         Self { protections: Protections { doubts: false, ..self.protections }, ..self }
     }
 
-    /// A filter that estimates each row from the readings up to it.
+    /// Builds a filter that estimates each row from the readings up to it.
     ///
     /// # Errors
-    /// If the sensor has no parameters for the estimator, or an option makes no sense for it.
+    /// If the sensor has no parameters for the estimator, or an option is invalid for it.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -231,7 +236,7 @@ impl<'a> FilterBuilder<'a> {
         Ok(Filter::new(self.kernel(kind)?))
     }
 
-    /// A filter that estimates each row from the readings up to `lag_s` seconds after it.
+    /// Builds a filter that estimates each row from the readings up to `lag_s` seconds after it.
     ///
     /// # Errors
     /// As [`Self::build`]; or if the estimator cannot look back.
@@ -253,11 +258,12 @@ impl<'a> FilterBuilder<'a> {
         Ok(LaggedFilter::new(self.kernel(kind)?, lag_s))
     }
 
-    /// Builds a filter that resumes where another one of the same sensor and options was stored, to the bit. R₀ and known strains
-    /// are those of the state; those given here count from now on.
+    /// Builds a filter that resumes from a stored one of the same sensor and options, to the bit. R₀ and known strains come
+    /// from the state; known strains given here are added.
     ///
     /// # Errors
-    /// If the state is of another sensor, of other options or of another version, or an initial strain is given: the first row is over.
+    /// If the state is of another sensor, other options or another version; or if an initial strain is given, since the first
+    /// row is over.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -295,18 +301,18 @@ impl<'a> FilterBuilder<'a> {
         Ok(filter)
     }
 
-    /// Refuses a start of what has begun.
+    /// Refuses an initial strain for a filter that has begun.
     fn without_start(self) -> Result<Self, Error> {
         if self.initial_strain.is_some() { Err(StoredError::Begun.into()) } else { Ok(self) }
     }
 
-    /// The estimator that was chosen.
+    /// Returns the chosen estimator.
     pub(crate) fn kind(&self) -> EstimatorKind {
         let kind = self.estimator.unwrap_or(self.sensor.params().default_estimator);
         if self.corrects { kind } else { self.sensor.params().filter_of(kind) }
     }
 
-    /// The filter that runs forward, with its reports.
+    /// Builds the forward filter, with its conversion to rows.
     fn kernel(self, kind: EstimatorKind) -> Result<Kernel, Error> {
         let mut filter = self.sensor.build(kind, &self.options()?)?;
         let scale = self.scale()?;
@@ -328,13 +334,13 @@ impl<'a> FilterBuilder<'a> {
         Ok(scale)
     }
 
-    /// Options of filter and smoother.
+    /// Returns the options of filter and smoother.
     pub(crate) fn options(self) -> Result<Options, Error> {
         let start = self.initial_strain.map_or(Ok(Start::Unknown), |strain| self.start_at(strain))?;
         Ok(Options { start, guard: self.guard()?, protections: self.protections })
     }
 
-    /// Doubts of a smoother; `None` if they are turned off.
+    /// Returns the doubts of a smoother; `None` if they are turned off.
     pub(crate) fn smoothers_doubts(self, kind: EstimatorKind) -> Result<Option<Doubts<f64>>, Error> {
         let params = self.sensor.params();
         let motion = &params.estimator(params.filter_of(kind)).map_err(SensorError::from)?.motion;
@@ -343,7 +349,7 @@ impl<'a> FilterBuilder<'a> {
         Ok(doubts.map(|doubts| self.initial_strain.map_or(doubts, |strain| of_known(doubts, strain))))
     }
 
-    /// True for a strain of zero, but for rounding.
+    /// True if a strain is zero, apart from rounding.
     pub(crate) fn is_at_rest(&self, strain: f64) -> bool {
         strain.abs() <= DOUBT.zero * self.sensor.params().limits.span()
     }

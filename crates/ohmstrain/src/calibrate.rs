@@ -7,10 +7,11 @@ use ohmstrain_sensor::{EstimatorKind, Findings, RecordingInfo, SensorParams};
 
 use crate::{Error, MADE_BY, Prior, Recording, Sensor};
 
-/// Calibrates a sensor on recordings with known strain, with every choice left to the program. See [`Calibration`].
+/// Calibrates a sensor on recordings with known strain, with all options at their defaults. See [`Calibration`].
 ///
 /// # Errors
-/// If the recordings are too short or too plain, of different quantities or units, or the readings do not tell the strain.
+/// If the recordings are too short or too uniform, of different quantities or units, or the readings do not determine the
+/// strain.
 ///
 /// ```
 /// use ohmstrain::{Recording, calibrate};
@@ -74,7 +75,7 @@ pub struct Calibrated {
 }
 
 impl<'a> Calibration<'a> {
-    /// Creates a calibration with every choice left to the program.
+    /// Creates a calibration with all options at their defaults.
     ///
     /// ```
     /// let calibration = ohmstrain::Calibration::new();
@@ -84,7 +85,8 @@ impl<'a> Calibration<'a> {
         Self { prior: None, estimator: None, branches: None, gauge: None }
     }
 
-    /// The estimator to calibrate and to make the sensor's default; the extended Kalman filter is calibrated in any case.
+    /// Sets the estimator that is calibrated and becomes the sensor's default; the extended Kalman filter is calibrated in any
+    /// case.
     ///
     /// ```
     /// use ohmstrain::{Calibration, EstimatorKind};
@@ -96,7 +98,7 @@ impl<'a> Calibration<'a> {
         Self { estimator: Some(kind), ..self }
     }
 
-    /// Relaxing branches of the law, 0 to 4, in place of what the filter does best with.
+    /// Sets the number of relaxing branches of the law, 0 to 4, instead of choosing it by the filter's error.
     ///
     /// ```
     /// let plain = ohmstrain::Calibration::new().branches(1);
@@ -106,7 +108,7 @@ impl<'a> Calibration<'a> {
         Self { branches: Some(branches), ..self }
     }
 
-    /// Family of the quasi-static curve, in place of a polynomial.
+    /// Sets the family of the quasi-static curve, instead of a polynomial.
     ///
     /// ```
     /// use ohmstrain::{Calibration, GaugeFamily};
@@ -118,8 +120,8 @@ impl<'a> Calibration<'a> {
         Self { gauge: Some(family), ..self }
     }
 
-    /// Uses a prior learned from other sensors of the make: a short motion is enough then. The law's structure is the prior's,
-    /// whatever [`Self::branches`] and [`Self::gauge`] are; the sensor's R₀ is its own.
+    /// Uses a prior learned from other sensors of the same make, with which a short motion is enough. The law's structure is
+    /// then the prior's, whatever [`Self::branches`] and [`Self::gauge`] say; the sensor's R₀ is its own.
     ///
     /// ```
     /// use ohmstrain::{Calibration, Prior};
@@ -133,7 +135,7 @@ impl<'a> Calibration<'a> {
         Self { prior: Some(prior), ..self }
     }
 
-    /// Calibrates. The same recordings give the same sensor.
+    /// Calibrates the sensor. The same recordings give the same sensor.
     ///
     /// # Errors
     /// As [`calibrate`].
@@ -193,7 +195,7 @@ impl<'a> Calibration<'a> {
         Ok(Calibrated { sensor, findings, rest_readings, distrusted, left_out })
     }
 
-    /// Structures of the law to choose from.
+    /// Returns the candidate structures of the law.
     fn structures(self, estimator: EstimatorKind) -> Vec<LawOptions> {
         let with_gauge = |options: &LawOptions| LawOptions { gauge: self.gauge.unwrap_or(options.gauge), ..*options };
         let structures: Vec<LawOptions> = LawOptions::candidates(estimator).iter().map(with_gauge).collect();

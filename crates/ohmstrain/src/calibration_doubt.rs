@@ -1,7 +1,7 @@
 /// A doubt about the recordings of a calibration, or about its result; see [`calibration_doubts`](crate::calibration_doubts) and
 /// [`Calibrated::doubts`](crate::Calibrated::doubts).
 ///
-/// Its text names no recording: `recordings()` does, by place.
+/// Its text names no recording; `recordings()` returns their indices.
 ///
 /// ```
 /// let doubt = ohmstrain::CalibrationDoubt::Copy { recordings: [1, 0] };
@@ -11,7 +11,7 @@
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum CalibrationDoubt {
-    /// Readings and reference stand in each other's column.
+    /// Readings and reference are in each other's column.
     Exchanged {
         /// The recording.
         recording: usize,
@@ -50,7 +50,7 @@ pub enum CalibrationDoubt {
         /// Range of the readings over their median, per unit of the reference.
         gauges: [f64; 2],
     },
-    /// Recordings that are hardly of one sensor.
+    /// Recordings that are probably not of one sensor.
     GaugesApart {
         /// The recordings, as in [`Self::ReferencesApart`].
         recordings: [usize; 2],
@@ -62,14 +62,14 @@ pub enum CalibrationDoubt {
         /// The second and the first of them.
         recordings: [usize; 2],
     },
-    /// Recordings at rest at resistances that one sensor hardly has.
+    /// Recordings whose resistances at rest are too different for one sensor.
     RestsApart {
         /// The recordings, the one with the smaller R₀ first.
         recordings: [usize; 2],
         /// Their R₀.
         rests: [f64; 2],
     },
-    /// A reference that stands still while the readings go up and down.
+    /// A reference that stays constant while the readings go up and down.
     Frozen {
         /// The recording.
         recording: usize,
@@ -82,7 +82,7 @@ pub enum CalibrationDoubt {
         /// Range of the readings, up and down, during that time.
         swing: f64,
     },
-    /// Strains that are negative, of a sensor that stretches.
+    /// Negative strains, although the sensor only stretches.
     Turned {
         /// The recording.
         recording: usize,
@@ -91,9 +91,9 @@ pub enum CalibrationDoubt {
         /// 99th percentile of the reference.
         upper: f64,
     },
-    /// Readings that follow the reference in one recording, and go against it in another.
+    /// Readings that rise with the reference in one recording, and fall with it in another.
     TurnedApart {
-        /// The recordings, the one whose readings go against it first.
+        /// The recordings, the one with falling readings first.
         recordings: [usize; 2],
     },
     /// A clock in milliseconds.
@@ -105,9 +105,9 @@ pub enum CalibrationDoubt {
         /// Duration of a stroke by this clock, s.
         stroke_s: f64,
     },
-    /// Intervals that the law is too wrong for.
+    /// Intervals that were widened because the law is too wrong.
     Widened {
-        /// Name of what they are intervals of.
+        /// Name of the quantity of the intervals.
         of: &'static str,
     },
 }
@@ -134,7 +134,7 @@ impl CalibrationDoubt {
         }
     }
 
-    /// Places of the recordings that it is about; none if it is about the result.
+    /// Returns the indices of the recordings concerned; empty if the doubt concerns the result.
     ///
     /// ```
     /// assert_eq!(ohmstrain::CalibrationDoubt::Copy { recordings: [1, 0] }.recordings(), [1, 0]);

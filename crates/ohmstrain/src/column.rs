@@ -69,7 +69,7 @@ impl Cell {
 }
 
 impl Column {
-    /// Its name in the header: the unit of the readings and the quantity that is estimated are in it.
+    /// Returns its name in the header, which contains the unit of the readings or the estimated quantity.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -110,7 +110,7 @@ impl Column {
         matches!(self.cell, Cell::Flags)
     }
 
-    /// The number of a row; NaN where it is not known, and for the flags.
+    /// Returns the number of a row; NaN if it is unknown, and for the flags.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -158,7 +158,7 @@ impl Header {
     pub(crate) const OHM_STRAIN: Self =
         Self { reading: ReadingUnit::Ohm, quantity: Quantity::Strain, has_joint: false };
 
-    /// Headers of all possible sensors: one that is calibrated on an angle has no joint besides.
+    /// Headers of all possible sensors. A sensor calibrated on an angle has no separate joint.
     const ALL: [Self; 6] = {
         let strain = Self::OHM_STRAIN;
         let angle = Self { quantity: Quantity::AngleDeg, ..strain };
@@ -183,7 +183,7 @@ impl Header {
         if self.has_joint { Cell::ALL.len() } else { Cell::ALL.len() - 2 }
     }
 
-    /// All columns, in order.
+    /// Returns all columns, in order.
     pub(crate) fn columns(self) -> impl Iterator<Item = Column> {
         Cell::ALL.into_iter().take(self.len()).map(move |cell| Column { name: self.name(cell), cell })
     }
@@ -218,7 +218,7 @@ impl Header {
     }
 }
 
-/// Name of the column of readings, in every file.
+/// Returns the name of the column of readings, the same in every file.
 pub(crate) const fn reading_column(unit: ReadingUnit) -> &'static str {
     match unit {
         ReadingUnit::Ohm => "resistance_ohm",

@@ -11,7 +11,7 @@ use thiserror::Error;
 use crate::number::{plain, significant};
 use crate::{ReferenceDoubt, StoredError, UnitDoubt};
 
-/// Reason for having no sensor, no filter or no estimate.
+/// Reason why there is no sensor, no filter or no estimate.
 ///
 /// ```
 /// let error = ohmstrain::Sensor::from_toml("format = 3").unwrap_err();
@@ -20,31 +20,31 @@ use crate::{ReferenceDoubt, StoredError, UnitDoubt};
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The text is no sensor.
+    /// The text is not a valid sensor.
     #[error(transparent)]
     Text(#[from] TextError),
-    /// The sensor has no parameters for the estimator, or they make no filter.
+    /// The sensor has no parameters for the estimator, or no filter can be built from them.
     #[error(transparent)]
     Sensor(#[from] SensorError),
-    /// A calibration was not made.
+    /// The calibration failed.
     #[cfg(feature = "calibrate")]
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
     /// The sensor cannot be written as TOML.
     #[error("cannot write parameters: {0}")]
     Write(#[from] toml::ser::Error),
-    /// A gate or an influence that no filter can have.
+    /// An invalid gate or influence.
     #[error(transparent)]
     Guard(ParameterError),
-    /// A joint that no sensor can sit on.
+    /// An invalid joint.
     #[error("the sensor's joint: {0}")]
     Joint(#[source] ParameterError),
-    /// A strain to start at, or that is known later, that the sensor never reports.
+    /// An initial or known strain that the sensor never reports.
     #[error("{name}: expected {} to {}, the limits of the sensor's {}, found {found}", plain(*lower), plain(*upper), quantity.name())]
     KnownStrain {
         /// Name of the number.
         name: &'static str,
-        /// Quantity that is estimated.
+        /// Estimated quantity.
         quantity: Quantity,
         /// Lower limit.
         lower: f64,
@@ -61,7 +61,7 @@ pub enum Error {
         /// Value that was given.
         found: f64,
     },
-    /// A resistance at rest that is none of the sensor's: in another unit, or of another sensor.
+    /// A resistance at rest that cannot be the sensor's: in another unit, or of another sensor.
     #[error(
         "resistance at rest: expected {} to {}, as the rested sensor read {} in calibration, found {}; give it in the unit of the \
          calibration's readings, and for a sensor of another size calibrate again",
@@ -76,10 +76,10 @@ pub enum Error {
         /// Value that was given.
         found: f64,
     },
-    /// Recordings of different quantities, strain and angle, or units, ohms and ratios; or others than the calibration's.
+    /// Recordings of different quantities (strain and angle) or units (ohms and ratios), or of others than the calibration's.
     #[error("expected recordings of one quantity and one unit, those of the calibration")]
     OtherQuantity,
-    /// A prior of another quantity than the recordings', strain or angle.
+    /// A prior for another quantity (strain or angle) than that of the recordings.
     #[error("the prior is of {}, the recordings are of {}", of_make.name(), found.name())]
     OtherMake {
         /// Quantity of the prior's sensors.
@@ -87,7 +87,7 @@ pub enum Error {
         /// Quantity of the recordings' reference.
         found: Quantity,
     },
-    /// Another number of channels than a fusion has.
+    /// A number of channels that differs from that of the fusion.
     #[error("expected {expected} channels, those of the fusion, found {found}")]
     OtherChannels {
         /// Number of channels of the fusion.
@@ -103,7 +103,7 @@ pub enum Error {
         /// Number of readings.
         readings: usize,
     },
-    /// Slices that are no recording.
+    /// Slices that do not form a valid recording.
     #[cfg(feature = "calibrate")]
     #[error(transparent)]
     Samples(#[from] SamplesError),
@@ -113,16 +113,16 @@ pub enum Error {
     /// A reference that seems to be in percent.
     #[error(transparent)]
     Reference(#[from] ReferenceDoubt),
-    /// A stored filter that cannot go on here.
+    /// A stored filter that cannot resume here.
     #[error(transparent)]
     Stored(#[from] StoredError),
-    /// The filter does not take a row. It stays as it was: the next good row goes on from the last good one.
+    /// The filter refused a row. It stays as it was: the next good row continues from the last good one.
     #[error(transparent)]
     Step(#[from] StepError),
-    /// Refused step at a row of a recording, counted from zero.
+    /// The filter refused a row of a recording.
     #[error("row {row}: {source}")]
     Row {
-        /// The row.
+        /// Index of the row, from zero.
         row: usize,
         /// Error of the step.
         source: StepError,
@@ -130,7 +130,7 @@ pub enum Error {
 }
 
 impl Error {
-    /// The error with the name of the file that the text was read from: `file:line: column c: message`.
+    /// Returns the error with the name of the file that the text was read from: `file:line: column c: message`.
     ///
     /// ```
     /// let error = ohmstrain::Sensor::from_toml("format = 3").unwrap_err();
@@ -203,7 +203,7 @@ pub enum TextCause {
         /// Version of the text.
         found: u32,
     },
-    /// A number that no sensor can have.
+    /// A number out of its range.
     #[error(transparent)]
     Field(FieldError),
 }

@@ -8,10 +8,10 @@ use serde::{Serialize, Serializer};
 use crate::column::Header;
 use crate::{Error, Flag, Flags, Reading, Sensor};
 
-/// Estimate at one row: the row of `estimates.csv`, a field per column. Serialised, it has the names of that file's
-/// header, which tell the unit; an unknown value is nothing.
+/// Estimate at one row: a row of `estimates.csv`, one field per column. It serialises with the names of that file's header,
+/// which contain the unit; an unknown value serialises as none.
 ///
-/// For a sensor that was calibrated in degrees, the four fields of strain are degrees and degrees per second.
+/// For a sensor calibrated in degrees, the four fields of strain are in degrees and degrees per second.
 ///
 /// ```
 /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -41,9 +41,9 @@ pub struct Estimate {
     pub relaxation_sd: f64,
     /// Slow drift and error of the law, relative to R₀.
     pub baseline: f64,
-    /// Predicted reading, in the sensor's unit, if the strain is held from now on for as long as in the longest hold of the
-    /// calibration (a minute, if it has seen none). It is the reading that was taken, or the sensor's expected one, minus the law's
-    /// relaxation, as far as that has come true in calibration.
+    /// Predicted reading, in the sensor's unit, if the strain is held from now on for as long as the longest hold of the
+    /// calibration (a minute, if it had none). It is the reading, or the sensor's expected one, minus the law's relaxation,
+    /// scaled by the share of it that was observed in calibration.
     pub settled_resistance: f64,
     /// Its standard deviation.
     pub settled_resistance_sd: f64,
@@ -66,7 +66,7 @@ pub struct Estimate {
     header: Header,
 }
 
-/// A row of which nothing is known: NaN and `None`. Serialised, it is one of a sensor that reads ohms and tells strains.
+/// A row with all values unknown: NaN and `None`. It serialises as a row of a sensor that reads ohms and estimates strain.
 impl Default for Estimate {
     fn default() -> Self {
         let unknown = f64::NAN;
@@ -111,12 +111,12 @@ impl Serialize for Estimate {
     }
 }
 
-/// Conversion from readings to the kernel and from there to rows.
+/// Conversion of readings to the kernel's input, and of its output to rows.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scale {
     /// R₀ in the unit of the readings.
     pub rest_reading: f64,
-    /// R₀ of the calibration, and what the rested sensor read then.
+    /// R₀ of the calibration, and the reading of the rested sensor then.
     calibrated: (f64, f64),
     limits: (f64, f64),
     quantity: Quantity,
@@ -134,7 +134,7 @@ impl Scale {
         Ok(Self { rest_reading, calibrated, limits, quantity, joint: sensor.joint()?, header: Header::of(params) })
     }
 
-    /// Moves R₀ to where the rested sensor reads `measured`.
+    /// Sets R₀ for a rested sensor that reads `measured`.
     pub(crate) fn rest_at(&mut self, measured: f64) -> Result<(), Error> {
         let (rest_reading, rested) = self.calibrated;
         check_rest(rested, measured)?;
@@ -147,12 +147,12 @@ impl Scale {
         self.limits.1 - self.limits.0
     }
 
-    /// The limits of the strain.
+    /// Returns the limits of the strain.
     pub(crate) const fn limits(&self) -> StrainRange<f64> {
         StrainRange { lower: self.limits.0, upper: self.limits.1 }
     }
 
-    /// A strain that is known to `sd`, within the limits or a little beyond.
+    /// Returns a known strain with standard deviation `sd`; refuses one far beyond the limits.
     pub(crate) fn known(&self, strain: f64, sd: f64) -> Result<Gaussian<f64>, Error> {
         let ((lower, upper), quantity) = (self.limits, self.quantity);
         if !((lower - strain).max(strain - upper) <= KNOWN_BEYOND * (upper - lower)) {
@@ -211,7 +211,7 @@ impl Scale {
     }
 }
 
-/// Refuses an R₀ that is none of a sensor that read `rested` at rest in calibration.
+/// Refuses an R₀ that is too far from the reading `rested` of the rested sensor in calibration.
 pub(crate) fn check_rest(rested: f64, measured: f64) -> Result<(), Error> {
     if !(measured.is_finite() && measured > 0.0) {
         return Err(Error::NotPositive { name: "resistance at rest", found: measured });
@@ -228,8 +228,8 @@ fn surprises(output: &Output) -> bool {
     output.verdict == ReadingVerdict::Downweighted && output.nis.is_none_or(|nis| nis > SURPRISING_NIS)
 }
 
-/// R/R₀ - 1 after a hold. What is read knows better than the law where relaxation starts from; one reading that surprises may
-/// be wrong, and then the law is right.
+/// Returns R/R₀ - 1 after a hold. The reading is a better start of the relaxation than the law. A surprising reading may be
+/// wrong, so that its distance from the law enters the variance.
 fn settled(output: &Output) -> Gaussian<f64> {
     let estimate = &output.estimate;
     let falls = estimate.still_relaxes;

@@ -3,11 +3,12 @@ use ohmstrain_calib::{Identifiability, Lag, LagError, Samples, identifiability, 
 use crate::{Error, Recording, Sensor};
 
 impl Recording<'_> {
-    /// Lag of the reference behind the readings, with its uncertainty: the same that `ohmstrain inspect`, `calibrate` and `evaluate`
-    /// tell. A recording whose lag [is too late](Lag::is_too_late) and [certain](Lag::is_certain) is not to be calibrated on as it is.
+    /// Returns the lag of the reference behind the readings, with its uncertainty, as `ohmstrain inspect`, `calibrate` and
+    /// `evaluate` report it. A recording whose lag [is too late](Lag::is_too_late) and [certain](Lag::is_certain) is not
+    /// suitable for calibration as it is.
     ///
     /// # Errors
-    /// [`LagError`] where the motion does not tell.
+    /// [`LagError`] if the motion does not determine the lag.
     ///
     /// ```
     /// use ohmstrain::{LagError, Recording};

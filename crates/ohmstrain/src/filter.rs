@@ -9,13 +9,13 @@ use crate::known::next_until;
 use crate::stored::{Ahead, Last, MadeOf, StoredKernel, WaitingRow};
 use crate::{Error, Estimate, Reading, Stored, StoredError};
 
-/// A live filter, and the way to it from readings and from it to rows.
+/// A live filter, with the conversions from readings and to rows.
 pub(crate) struct Kernel {
     pub filter: Box<dyn ohmstrain_sensor::Filter>,
     pub rows: RowWriter,
-    /// Strains that will be known, in order of time.
+    /// Strains known at later times, in order of time.
     pub known: VecDeque<(f64, Gaussian<f64>)>,
-    /// Sensor and options that it was made of.
+    /// Sensor and options that it was built from.
     pub made_of: MadeOf,
 }
 
@@ -42,11 +42,11 @@ impl RowWriter {
 }
 
 impl Kernel {
-    /// Sets R₀, which no longer follows the readings.
+    /// Sets R₀, which is no longer adapted to the readings.
     fn rest_resistance(&mut self, measured: f64) -> Result<(), Error> {
         self.rows.scale.rest_at(measured)?;
         self.filter.rest(measured).map_err(Error::Step)?;
-        // What errors were known of were those of another R₀.
+        // Known errors belong to the former R₀.
         self.rows.errors = KnownErrors::new(self.rows.scale.limits());
         Ok(())
     }
@@ -60,7 +60,7 @@ impl Kernel {
         })
     }
 
-    /// Resumes from a stored state; known strains of both are kept.
+    /// Resumes from a stored state; known strains of both remain.
     fn resume(&mut self, stored: StoredKernel) -> Result<(), Error> {
         let StoredKernel { rest_reading, known, strains, filter } = stored;
         self.filter.resume(filter).map_err(|error| StoredError::Content(Box::new(error)))?;
@@ -99,11 +99,11 @@ impl Filter {
         Self { kernel, last: None }
     }
 
-    /// Takes the reading at `time_s` and tells what is known then. A missing reading is NaN, `None` or
-    /// [`Reading::MISSING`]; the estimate is then a prediction. An infinite one is none that a sensor can have.
+    /// Takes the reading at `time_s`, and returns the estimate from all readings so far. A missing reading is NaN, `None` or
+    /// [`Reading::MISSING`]; the estimate is then a prediction. An infinite reading is implausible.
     ///
     /// # Errors
-    /// If time goes backwards or is no number. The filter stays as it was: the next good row goes on from the last good one.
+    /// If time goes backwards or is NaN. The filter stays as it was: the next good row continues from the last good one.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -129,12 +129,13 @@ impl Filter {
         Ok(row)
     }
 
-    /// Takes a known strain (or angle), as of now, to `sd`: the estimate of the last row, or of the first one if there is
-    /// none yet, and those after it follow. The error at that time counts for seconds, and for an hour as far as more than one known
-    /// strain, or one that is far from the estimate, shows an offset or another gain.
+    /// Takes a strain (or angle) known now, with standard deviation `sd`. It corrects the estimate of the last row (of the
+    /// first one, if there is none yet) and those of later rows. The error at that time counts for seconds, and for an hour as
+    /// far as several known strains, or one far from the estimate, show an offset or another gain.
     ///
     /// # Errors
-    /// If the strain lies beyond the limits by more than a tenth of them, or `sd` is not positive. The filter stays as it was.
+    /// If the strain lies beyond the limits by more than a tenth of their span, or `sd` is not positive. The filter stays as it
+    /// was.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -156,10 +157,11 @@ impl Filter {
         Ok(kernel.rows.known_row((time_s, reading), &output))
     }
 
-    /// Stores all that the next row depends on: [`FilterBuilder::resume`](crate::FilterBuilder::resume) resumes from it, to the bit.
+    /// Stores everything that the next row depends on; [`FilterBuilder::resume`](crate::FilterBuilder::resume) resumes from it,
+    /// to the bit.
     ///
     /// # Errors
-    /// If TOML cannot hold it.
+    /// If TOML cannot represent it.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -178,7 +180,7 @@ impl Filter {
         Ok(Stored::new(&self.kernel.made_of, None, last, Vec::new(), self.kernel.store()?))
     }
 
-    /// R₀ in the unit of the readings.
+    /// Returns R₀ in the unit of the readings.
     pub(crate) const fn rest_reading(&self) -> f64 {
         self.kernel.rows.scale.rest_reading
     }
@@ -193,7 +195,7 @@ impl Filter {
     /// Sets the reading of the rested, unstretched sensor from now on, in place of that in calibration.
     ///
     /// # Errors
-    /// If it is not a positive number, or farther from the calibration's than by a factor of
+    /// If it is not a positive number, or differs from that in calibration by more than a factor of
     /// [`FARTHEST_REST`](crate::FARTHEST_REST).
     ///
     /// ```
@@ -209,7 +211,7 @@ impl Filter {
     }
 }
 
-/// A running filter that waits: each row is estimated from the readings up to a fixed lag after it. See
+/// A running fixed-lag smoother: each row is estimated from the readings up to a fixed lag after it. See
 /// [`FilterBuilder::build_lagged`](crate::FilterBuilder::build_lagged).
 ///
 /// ```
@@ -229,11 +231,11 @@ pub struct LaggedFilter {
     lag_s: f64,
     /// Time of the last row, s.
     last_s: Option<f64>,
-    /// Rows whose estimates wait for later readings.
+    /// Rows whose estimates are pending until later readings arrive.
     waiting: VecDeque<(f64, Reading)>,
     /// Estimates that have become due.
     due: Vec<Estimate>,
-    /// True if they have been handed out.
+    /// True if they have been returned.
     are_out: bool,
 }
 
@@ -242,10 +244,10 @@ impl LaggedFilter {
         Self { kernel, lag_s, last_s: None, waiting: VecDeque::new(), due: Vec::new(), are_out: true }
     }
 
-    /// Takes the reading at `time_s`, as [`Filter::step`] does, and hands out the rows that have become due, in order.
+    /// Takes the reading at `time_s`, as [`Filter::step`] does, and returns the rows that have become due, in order.
     ///
     /// # Errors
-    /// As [`Filter::step`]. Rows that have become due meanwhile are handed out with the next step.
+    /// As [`Filter::step`]. Rows that have become due meanwhile are returned by the next step.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -274,10 +276,10 @@ impl LaggedFilter {
         Ok(&self.due)
     }
 
-    /// Hands out the rows that still wait, from all readings there are.
+    /// Returns the pending rows, estimated from all available readings.
     ///
     /// # Errors
-    /// If a step backwards fails.
+    /// If a step of the smoother fails.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -298,7 +300,7 @@ impl LaggedFilter {
         Ok(&self.due)
     }
 
-    /// Sets the strain as [`Filter::know`] does, for rows that are still to be handed out and those to come.
+    /// Sets a known strain as [`Filter::know`] does, for rows that are still pending and later ones.
     ///
     /// # Errors
     /// As [`Filter::know`].
@@ -321,11 +323,11 @@ impl LaggedFilter {
         Ok(())
     }
 
-    /// Stores the filter as [`Filter::store`] does, with the rows that wait. [`FilterBuilder::resume_lagged`](crate::FilterBuilder::resume_lagged)
-    /// resumes from it.
+    /// Stores the filter as [`Filter::store`] does, with its pending rows.
+    /// [`FilterBuilder::resume_lagged`](crate::FilterBuilder::resume_lagged) resumes from it.
     ///
     /// # Errors
-    /// If TOML cannot hold it, or rows that have become due are still to be handed out, as after an error: take another row first.
+    /// If TOML cannot represent it, or if rows that are due have not been returned, as after an error: take another row first.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -354,7 +356,8 @@ impl LaggedFilter {
         Ok(())
     }
 
-    /// Takes in what is known by the last row. Rows are handed out as soon as they are due: it is after them.
+    /// Applies strains known by the last row. They lie after all rows returned so far, since rows are returned as soon as they
+    /// are due.
     fn take_known(&mut self) {
         let Some(time_s) = self.last_s else { return };
         while let Some(known) = next_until(&mut self.kernel.known, time_s) {
@@ -363,10 +366,10 @@ impl LaggedFilter {
         }
     }
 
-    /// Sets the reading of the rested sensor, see [`Filter::rest_resistance`].
+    /// Sets the reading of the rested sensor; see [`Filter::rest_resistance`].
     ///
     /// # Errors
-    /// If it is not a positive number, or farther from the calibration's than by a factor of
+    /// If it is not a positive number, or differs from that in calibration by more than a factor of
     /// [`FARTHEST_REST`](crate::FARTHEST_REST).
     ///
     /// ```

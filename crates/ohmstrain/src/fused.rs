@@ -19,7 +19,7 @@ impl Document for FusionParams {
     }
 }
 
-/// Several sensors that see one strain, with what their calibration found of how to fuse them.
+/// Several sensors that measure one strain, with the calibrated parameters of their fusion.
 ///
 /// ```no_run
 /// use ohmstrain::{FusedSensor, Sensor};
@@ -44,7 +44,7 @@ impl FusedSensor {
     /// Fuses sensors by the text of a fusion file.
     ///
     /// # Errors
-    /// With line and column if the text is no fusion, or if it is one of other sensors: of another number or quantity.
+    /// With line and column if the text is not a fusion; or if the number or the quantity of the sensors differs.
     pub fn from_toml(sensors: Vec<Sensor>, text: &str) -> Result<Self, Error> {
         Self::new(sensors, text::parse(text)?)
     }
@@ -52,7 +52,7 @@ impl FusedSensor {
     /// Fuses sensors by these parameters.
     ///
     /// # Errors
-    /// If they are of another number of sensors, or of another quantity.
+    /// If their number or quantity of the sensors differs.
     pub fn new(sensors: Vec<Sensor>, params: FusionParams) -> Result<Self, Error> {
         if sensors.len() != params.channels() {
             return Err(Error::OtherChannels { expected: params.channels(), found: sensors.len() });
@@ -63,45 +63,45 @@ impl FusedSensor {
         Ok(Self { sensors, params: Arc::new(params) })
     }
 
-    /// The text of its fusion file: what [`Self::from_toml`] reads.
+    /// Returns the text of its fusion file, which [`Self::from_toml`] reads.
     ///
     /// # Errors
-    /// If TOML cannot hold a number.
+    /// If TOML cannot represent a number.
     pub fn to_toml(&self) -> Result<String, Error> {
         Ok(toml::to_string(self.params.as_ref())?)
     }
 
-    /// The sensors of its channels.
+    /// Returns the sensors of its channels.
     #[must_use]
     pub fn sensors(&self) -> &[Sensor] {
         &self.sensors
     }
 
-    /// All its numbers but those of the sensors.
+    /// Returns all its numbers except those of the sensors.
     #[must_use]
     pub fn params(&self) -> &FusionParams {
         &self.params
     }
 
-    /// The quantity that it estimates.
+    /// Returns the estimated quantity.
     #[must_use]
     pub fn quantity(&self) -> Quantity {
         self.params.quantity
     }
 
-    /// A filter of all channels, each with the default estimator of its sensor.
+    /// Builds a filter of all channels, each with the default estimator of its sensor.
     ///
     /// # Errors
-    /// If a filter of a channel cannot be made.
+    /// If the filter of a channel cannot be built.
     pub fn filter(&self) -> Result<FusedFilter, Error> {
         let filters = self.sensors.iter().map(|sensor| sensor.filter().build()).collect::<Result<_, _>>()?;
         self.filter_of(filters)
     }
 
-    /// A filter of these filters of its sensors, in their order: with another R₀, for one.
+    /// Builds a fused filter from filters of its sensors, in their order; these may have another R₀, for example.
     ///
     /// # Errors
-    /// If they are of another number, or the joint of the first sensor is none.
+    /// If their number differs, or the joint of the first sensor is invalid.
     pub fn filter_of(&self, filters: Vec<Filter>) -> Result<FusedFilter, Error> {
         if filters.len() != self.sensors.len() {
             return Err(Error::OtherChannels { expected: self.sensors.len(), found: filters.len() });
@@ -125,7 +125,7 @@ pub struct FusedFilter {
 pub struct FusedEstimate {
     /// Time, s.
     pub time_s: f64,
-    /// Strain, or what the sensors were calibrated on.
+    /// Strain, or the quantity that the sensors were calibrated on.
     pub strain: f64,
     /// Its standard deviation.
     pub strain_sd: f64,
@@ -133,16 +133,16 @@ pub struct FusedEstimate {
     pub angle_deg: Option<f64>,
     /// Its standard deviation.
     pub angle_sd: Option<f64>,
-    /// Index of the channel that disagrees with all others: it was left out.
+    /// Index of a channel that disagrees with all others and was left out.
     pub faulty: Option<usize>,
-    /// True if the readings together are unlike any of the calibration: the interval is nearly that of an unknown strain.
+    /// True if the readings together are unlike any in the calibration: the interval is then nearly that of an unknown strain.
     pub is_unlike: bool,
-    /// Estimates of the channels by themselves.
+    /// Estimate of each channel by itself.
     pub channels: Vec<Estimate>,
 }
 
 impl FusedFilter {
-    /// Takes a reading of each channel. A missing one is NaN, `None` or [`Reading::MISSING`].
+    /// Takes a reading of each channel. A missing reading is NaN, `None` or [`Reading::MISSING`].
     ///
     /// # Errors
     /// If there are more or fewer readings than channels, or time goes backwards. The filter stays as it was.
@@ -169,7 +169,7 @@ impl FusedFilter {
     }
 }
 
-/// State of a channel for the fusion: no reading that its own filter does not believe.
+/// Returns the state of a channel for the fusion, without a reading that its own filter rejects.
 fn state(filter: &Filter, row: &Estimate) -> ChannelState {
     const UNREAD: [Flag; 4] = [Flag::Missing, Flag::Saturated, Flag::Implausible, Flag::Stuck];
     let is_read = !UNREAD.iter().any(|flag| row.flags.has(*flag));
@@ -180,7 +180,7 @@ fn state(filter: &Filter, row: &Estimate) -> ChannelState {
     }
 }
 
-/// Fused sensor with its quality on parts that calibration left out.
+/// Fused sensor with its quality on held-out parts of the calibration.
 #[cfg(feature = "calibrate")]
 #[derive(Clone, Debug)]
 #[non_exhaustive]
@@ -193,11 +193,11 @@ pub struct Fused {
     pub channels: Vec<Option<Scores>>,
 }
 
-/// Fuses channels that see one strain. Each comes with its calibration and the recordings that this was made of; their rows have the same
-/// times and strains.
+/// Fuses channels that measure one strain. Each comes with its calibration and the recordings that it was calibrated on; rows
+/// of all channels have the same times and strains.
 ///
 /// # Errors
-/// If there are less than two channels, if they are of different quantities, or if their recordings have no rows in common.
+/// If there are fewer than two channels, if they are of different quantities, or if their recordings have no rows in common.
 ///
 /// ```no_run
 /// use ohmstrain::{Calibration, Recording, fuse};

@@ -7,10 +7,10 @@ use ohmstrain_sensor::{KnownErrors, KnownStrain, MOST_KNOWN};
 use crate::Error;
 use crate::estimate::Scale;
 
-/// Default standard deviation of a known strain, in spans of the limits.
+/// Default standard deviation of a known strain, as a share of the limits' span.
 const KNOWN_TO: f64 = 0.005;
 
-/// A strain (or angle) that is known at a time: a stop, a mark on the bench, a joint that is seen.
+/// A strain (or angle) known at a certain time: at an end stop, a mark on the bench, or a joint in view.
 ///
 /// ```
 /// use ohmstrain::Known;
@@ -20,16 +20,16 @@ const KNOWN_TO: f64 = 0.005;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Known {
-    /// Time, s: it is the strain of the first row from then on.
+    /// Time, s. It applies to the first row at or after this time.
     pub time_s: f64,
     /// The strain, or the angle in degrees.
     pub strain: f64,
-    /// Its standard deviation; without it 0.5 % of the sensor's limits.
+    /// Its standard deviation; the default is 0.5 % of the limits' span.
     pub sd: Option<f64>,
 }
 
 impl Known {
-    /// Known to 0.5 % of the sensor's limits.
+    /// Creates a known strain with the default standard deviation.
     ///
     /// ```
     /// assert_eq!(ohmstrain::Known::new(3.0, 0.0).sd, None);
@@ -45,14 +45,14 @@ impl Known {
     }
 }
 
-/// Checked strains in order of time.
+/// Checks known strains, and returns them in order of time.
 pub(crate) fn in_order(known: &[Known], scale: &Scale) -> Result<VecDeque<(f64, Gaussian<f64>)>, Error> {
     let mut known = known.iter().map(|known| known.checked(scale)).collect::<Result<Vec<_>, _>>()?;
     known.sort_by(|a, b| a.0.total_cmp(&b.0));
     Ok(known.into())
 }
 
-/// The next of them that is known by `time_s`.
+/// Removes and returns the next strain that is known by `time_s`.
 pub(crate) fn next_until(known: &mut VecDeque<(f64, Gaussian<f64>)>, time_s: f64) -> Option<Gaussian<f64>> {
     known.front().is_some_and(|known| known.0 <= time_s).then(|| known.pop_front()).flatten().map(|known| known.1)
 }
@@ -61,17 +61,17 @@ pub(crate) fn next_until(known: &mut VecDeque<(f64, Gaussian<f64>)>, time_s: f64
 pub(crate) struct KnownOfAll {
     limits: StrainRange<f64>,
     strains: Vec<KnownStrain>,
-    /// Number of strains known by the row that was asked for last, and the errors at those around it.
+    /// Number of strains known by the row requested last, and the errors at those around it.
     around: Option<(usize, KnownErrors)>,
 }
 
 impl KnownOfAll {
-    /// Strains in order of time.
+    /// Creates it from strains in order of time.
     pub(crate) const fn new(limits: StrainRange<f64>, strains: Vec<KnownStrain>) -> Self {
         Self { limits, strains, around: None }
     }
 
-    /// A statement without what is known of its error.
+    /// Corrects an estimate by the errors at known strains.
     pub(crate) fn correct(&mut self, time_s: f64, estimated: Gaussian<f64>) -> Gaussian<f64> {
         let before = self.strains.partition_point(|strain| strain.time_s <= time_s);
         let is_new = self.around.as_ref().is_none_or(|around| around.0 != before);

@@ -1,6 +1,6 @@
 use crate::{Known, Sensor};
 
-/// A strain to start at that the sensor never reports; see [`Sensor::check_start`].
+/// An initial strain that the sensor never reports; see [`Sensor::check_start`].
 ///
 /// ```
 /// let doubt = ohmstrain::StartDoubt { found: 0.35, lower: 0.0, upper: 0.33 };
@@ -19,10 +19,10 @@ pub struct StartDoubt {
 impl std::error::Error for StartDoubt {}
 
 impl Sensor {
-    /// Checks that the sensor can report a strain to start at. One a little beyond the limits is accepted.
+    /// Checks that the sensor can report an initial strain. One slightly beyond the limits is accepted.
     ///
     /// # Errors
-    /// If it is outside of the sensor's limits.
+    /// If it is outside the sensor's limits.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -36,7 +36,7 @@ impl Sensor {
     }
 }
 
-/// A known strain that no row came for; see [`unused_known`].
+/// A known strain without a row; see [`unused_known`].
 ///
 /// ```
 /// let doubt = ohmstrain::UnusedKnown { known: ohmstrain::Known::new(70.0, 0.1), first_s: 0.0, last_s: 60.0 };
@@ -48,11 +48,11 @@ pub struct UnusedKnown {
     pub known: Known,
     /// First time of the recording, s.
     pub first_s: f64,
-    /// Its last one, s.
+    /// Last time of the recording, s.
     pub last_s: f64,
 }
 
-/// Known strains after the end of a recording that goes from a first to a last time, s.
+/// Returns the known strains after the end of a recording, whose first and last time are given in s.
 ///
 /// ```
 /// use ohmstrain::{Known, unused_known};

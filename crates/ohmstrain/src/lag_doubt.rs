@@ -16,14 +16,14 @@ pub enum LagDoubt {
         /// Largest lag searched for, s; negative if the reference is early.
         lag_s: f64,
     },
-    /// Two lags that fit alike, neither of them zero, since the motion repeats: the reference cannot be moved.
+    /// Two lags that fit equally well, neither of them zero, since the motion repeats: the reference cannot be moved.
     Repeats {
         /// The two lags, s, the better one first.
         lags_s: [f64; 2],
     },
-    /// Late, too little to matter.
+    /// Late, but too little to matter.
     Little(Lag),
-    /// Late, but the readings do not tell for certain.
+    /// Late, but the readings do not determine it with certainty.
     Uncertain(Lag),
     /// Certainly too late to calibrate on.
     Certain(Lag),
@@ -45,7 +45,7 @@ impl LagDoubt {
 }
 
 impl Recording<'_> {
-    /// Checks that the reference is on the clock of the readings; returns `None` if it is, as far as the readings tell.
+    /// Checks that the reference has the clock of the readings; returns `None` if it does, as far as the readings show.
     ///
     /// ```
     /// let recording = ohmstrain::Recording::new(&[0.0, 0.1], &[1600.0, 1610.0], &[0.00, 0.01])?;

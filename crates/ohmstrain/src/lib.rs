@@ -1,8 +1,8 @@
 //! Estimation of strain, with an honest error bar, from the resistance of a soft, stretchable strain sensor.
 //!
-//! A [`Sensor`] holds the result of a calibration: read from a `sensor.toml`, or made by [`calibrate`] from recordings with known
-//! strain. It makes a [`Filter`] for readings as they come, and smooths whole recordings; both give rows
-//! of plain numbers, [`Estimate`].
+//! A [`Sensor`] holds the result of a calibration: it is read from a `sensor.toml`, or made by [`calibrate`] from recordings
+//! with known strain. It builds a [`Filter`] for live readings, and smooths whole recordings; both return rows of plain
+//! numbers, [`Estimate`].
 //!
 //! ```
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -20,7 +20,7 @@
 //! - The library works on slices and rows, not files. Readings are in the unit of the calibration, Ω or a ratio; strains are fractions.
 //! - All input is checked: version, fields and the range of every number of a sensor, the unit of a recording.
 //! - An error leaves a filter as it was. A missing reading is NaN or `None`.
-//! - Results are deterministic: nothing is random without a seed, no clock is read.
+//! - Results are deterministic: every random number has a fixed seed, and no clock is read.
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
@@ -127,7 +127,7 @@ pub use ohmstrain_sensor::{
     EstimatorKind, FieldError, Findings, JointParams, Quantity, ReadingUnit, Scores, SensorError, SensorParams,
 };
 
-/// Program and version, as written into files.
+/// Name and version of the program, as written into files.
 ///
 /// ```
 /// assert!(ohmstrain::MADE_BY.starts_with("ohmstrain "));

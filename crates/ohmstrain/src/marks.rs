@@ -2,12 +2,12 @@ use ohmstrain_calib::{Mark, MarkedReference, Samples};
 
 use crate::{Error, Recording};
 
-/// References for recordings whose strain is known at marks only; references in `recordings` are not looked at. Calibrate on recordings
-/// with these strains and [`Recording::with_strain_sd`].
+/// Estimates references for recordings whose strain is known at marks only; references in `recordings` are ignored. Calibrate
+/// on recordings with these strains and [`Recording::with_strain_sd`].
 ///
 /// # Errors
-/// If there are not as many lists of marks as recordings, if marks contradict each other or lie outside of their recording, or if no law
-/// explains the motion.
+/// If the numbers of lists of marks and of recordings differ, if marks contradict each other or lie outside their recording, or
+/// if no law explains the motion.
 ///
 /// ```
 /// use ohmstrain::{Mark, Recording, marked_references};

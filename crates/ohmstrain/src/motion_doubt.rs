@@ -1,5 +1,5 @@
-//! Doubts about how a reference moves: it stands still while the readings move, it has the other sign, or its clock counts
-//! milliseconds.
+//! Doubts about the motion of a reference: it is constant while the readings move, it has the opposite sign, or its clock
+//! counts milliseconds.
 
 use ohmstrain_sensor::Quantity;
 
@@ -7,26 +7,26 @@ use crate::calibration_doubt::CalibrationDoubt;
 use crate::recording::Recording;
 use crate::unit_doubt::quantile;
 
-/// Time, s, and number of rows after which a constant reference may be frozen.
+/// Duration, s, and number of rows from which a constant reference may be frozen.
 const FROZEN_S: f64 = 5.0;
 const FROZEN_ROWS: usize = 40;
-/// Readings of a body at rest relax in one direction, but for how they begin: this share of a still part is passed over.
+/// Share of a constant part that is skipped at its beginning; after that, readings of a body at rest relax in one direction.
 const BEGINS: f64 = 0.2;
-/// Share of their range by which readings move up and down, in the rest of a still part, only if the body moves.
+/// Share of their range by which readings move both up and down, in the rest of a constant part, only if the body moves.
 const SWING: f64 = 0.3;
-/// Rows whose median counts as one: a spike is no swing.
+/// Number of rows that are replaced by their median, so that a spike is not a swing.
 const GROUP: usize = 5;
-/// Strains reach less than this share of the other side beyond zero where a sensor only stretches.
+/// Share of the negative range that the positive range stays below if the sign is wrong.
 const BEYOND_ZERO: f64 = 0.1;
-/// Readings that follow a reference have this correlation with it, or the opposite one.
+/// Least magnitude of the correlation of readings that follow a reference.
 const FOLLOWS: f64 = 0.5;
-/// Clocks that count whole seconds, so far apart, over strokes that take so long, of which there are several, count milliseconds:
-/// nobody leads a sensor to and fro for hours, a row every five seconds.
+/// Limits for a clock in milliseconds: whole numbers, a step of at least this many seconds, longer strokes than this, s, and at
+/// least this many of them. Nobody moves a sensor to and fro for hours, with a row every five seconds.
 const LEAST_STEP_S: f64 = 5.0;
 const LONGEST_STROKE_S: f64 = 600.0;
 const FEWEST_STROKES: f64 = 3.0;
 
-/// Doubts about the motion in the recordings of one calibration, as they are before rows are left out.
+/// Returns doubts about the motion in the recordings of one calibration, before rows are left out.
 ///
 /// ```
 /// use ohmstrain::{CalibrationDoubt, Recording, motion_doubts};
@@ -82,7 +82,7 @@ impl Moves {
         };
         let part = still.filter(is_frozen).max_by(|a, b| a.len().cmp(&b.len()))?;
         let (first, last) = (part.first()?, part.last()?);
-        // Readings that have nothing to do with the reference elsewhere are another matter.
+        // If readings are unrelated to the reference elsewhere, the problem is another one.
         let elsewhere =
             self.rows.iter().filter(|row| !(first[0]..=last[0]).contains(&row[0])).copied().collect::<Vec<_>>();
         if !(correlation(&elsewhere).abs() > FOLLOWS) {
@@ -120,7 +120,7 @@ impl Moves {
     }
 }
 
-/// Correlation of readings and reference; NaN of one that does not move.
+/// Returns the correlation of readings and reference; NaN if either is constant.
 fn correlation(rows: &[[f64; 3]]) -> f64 {
     let mean = |column: usize| rows.iter().map(|row| row[column]).sum::<f64>() / rows.len() as f64;
     let means = [mean(1), mean(2)];
@@ -141,7 +141,7 @@ fn swing(part: &[[f64; 3]]) -> f64 {
     up.min(down)
 }
 
-/// Two recordings whose readings follow the reference in opposite directions.
+/// Finds two recordings whose readings follow the reference in opposite directions.
 fn turned_apart(moves: &[Moves]) -> Option<CalibrationDoubt> {
     let place = |is: &dyn Fn(f64) -> bool| moves.iter().position(|moves| is(correlation(&moves.rows)));
     let recordings = [place(&|r| r < -FOLLOWS)?, place(&|r| r > FOLLOWS)?];

@@ -3,12 +3,12 @@ use std::ops::Range;
 use ohmstrain_ekf::live::{NEVER_READ_S, Unread};
 use ohmstrain_sensor::Output;
 
-/// Pauses of the readings in a recording that is smoothed, from its end to its beginning.
+/// Pauses of the readings in a recording that is smoothed, from its end to its start.
 pub(crate) struct Pauses {
     unread: Unread<f64>,
     /// Time without a reading before the first row, s.
     before_s: f64,
-    /// Time of the row that was seen last, s, and how long after it the next reading comes.
+    /// Time of the row seen last, s, and the time from it to the next reading, s.
     next: Option<(f64, f64)>,
 }
 
@@ -17,8 +17,8 @@ impl Pauses {
         Self { unread, before_s, next: None }
     }
 
-    /// Widens the estimates of a segment in rows without readings: the strain moves from the last one and to the next
-    /// one. The time since the last reading before the segment is unknown, but only at its beginning.
+    /// Widens the estimates of a segment in rows without readings, since the strain moves between the last reading and the next
+    /// one. At the beginning of the segment, the time since the last reading before it is unknown.
     pub(crate) fn widen(&mut self, rows: Range<usize>, time_s: impl Fn(usize) -> f64, outputs: &mut [Output]) {
         let mut until_s = vec![0.0; outputs.len()];
         for (k, (until_s, output)) in rows.clone().zip(until_s.iter_mut().zip(outputs.iter())).rev() {

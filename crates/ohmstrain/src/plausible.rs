@@ -2,24 +2,24 @@ use ohmstrain_sensor::{Quantity, ReadingUnit, SensorParams};
 
 use crate::unit_doubt::LEAST_OHM;
 use crate::{Calibrated, CalibrationDoubt, Recording};
-/// A resistance never falls below this share of its largest value; a strain does at rest.
+/// Smallest ratio of a sensor's smallest to its largest resistance; a strain falls to zero at rest.
 const LEAST_OF_LARGEST: f64 = 0.2;
 /// Joints turn by less than this, degrees.
 const FULL_TURN_DEG: f64 = 360.0;
-/// Ratios between recordings that no sensor explains, so that it must be the unit.
+/// Ratio between recordings from which the unit must differ, since no sensor explains it.
 const UNIT_RATIO: f64 = 20.0;
-/// Ratios between recordings of one sensor that are worth a word: R₀ drifts by a tenth or two from day to day, and the
-/// readings' change per strain depends on how it is led.
+/// Ratios between recordings of one sensor from which a warning is due. R₀ drifts by a tenth or two from day to day, and the
+/// readings' change per strain depends on how the sensor is mounted.
 const REST_RATIO: f64 = 1.3;
 const GAUGE_RATIO: f64 = 3.0;
 
-/// Largest strain that is not taken for percent, unless the unit is known: four times the sensor's own length.
+/// Largest strain that is not taken for percent, unless the unit is known: four times the unstretched length.
 const LARGEST_STRAIN: f64 = 3.0;
-/// Above a strain of one, readings that change by less than this per strain are taken for it, too.
+/// Change of the readings per strain below which a reference above one is taken for percent, too.
 const LEAST_GAUGE: f64 = 0.05;
 
-/// Returns doubts about the recordings of one calibration: about their units, and about being of one sensor. Refusals come first,
-/// then warnings. Units that [are known](Recording::strain_unit_is_known) are not doubted.
+/// Returns doubts about the recordings of one calibration: about their units, and whether they are of one sensor. Refusals come
+/// first, then warnings. Units that [are known](Recording::strain_unit_is_known) are not doubted.
 ///
 /// ```
 /// use ohmstrain::{CalibrationDoubt, Recording, calibration_doubts};
@@ -40,12 +40,12 @@ pub fn calibration_doubts(recordings: &[Recording]) -> Vec<CalibrationDoubt> {
         .collect();
     let single = known.iter().filter_map(|(place, figures)| figures.doubt(&recordings[*place], *place));
     let mut doubts: Vec<_> = single.chain(apart(&known)).chain(copies(recordings)).collect();
-    // What stops a calibration comes first.
+    // Refusals come first.
     doubts.sort_by_key(|doubt| !doubt.is_refusal());
     doubts
 }
 
-/// Two recordings that differ most in something, and by how much, if that is more than a factor.
+/// Returns the two recordings that differ most in a value, with both values, if their ratio exceeds a factor.
 fn farthest(values: &[(usize, f64)], factor: f64) -> Option<([usize; 2], [f64; 2])> {
     let least = values.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
     let most = values.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
@@ -79,7 +79,7 @@ fn copies(recordings: &[Recording]) -> Vec<CalibrationDoubt> {
     recordings.iter().enumerate().filter_map(copy).collect()
 }
 
-/// A recording in figures.
+/// Characteristic numbers of a recording.
 struct Figures {
     /// Least and largest reading.
     readings: (f64, f64),
@@ -92,7 +92,7 @@ struct Figures {
 }
 
 impl Figures {
-    /// `None` if nothing is known or moves.
+    /// Returns the numbers; `None` if nothing is known or nothing moves.
     fn new(recording: &Recording) -> Option<Self> {
         let sorted = |values: &[f64]| {
             let mut known: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
@@ -123,7 +123,7 @@ impl Figures {
             .then_some(CalibrationDoubt::KiloOhm { recording, median: self.median })
     }
 
-    /// Strains where readings are expected, and readings where strains are.
+    /// True if the reference looks like readings, and the readings like strains.
     fn is_exchanged(&self, quantity: Quantity) -> bool {
         let (readings, references) = (self.readings, self.references);
         let least = if quantity == Quantity::AngleDeg { FULL_TURN_DEG.max(readings.1) } else { readings.1 };
@@ -134,7 +134,7 @@ impl Figures {
 }
 
 impl Calibrated {
-    /// Returns warnings about the result: R₀ that differ between recordings, and intervals that the law is too wrong for.
+    /// Returns warnings about the result: R₀ that differs between recordings, and intervals for which the law is too wrong.
     ///
     /// ```
     /// fn warn(calibrated: &ohmstrain::Calibrated) {

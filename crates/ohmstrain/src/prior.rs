@@ -3,7 +3,7 @@ use ohmstrain_sensor::SensorParams;
 
 use crate::{Error, MADE_BY, Sensor, text};
 
-/// Common properties of calibrated sensors of one make: with them a short motion calibrates the next one, see
+/// Common properties of calibrated sensors of one make, with which a short motion calibrates the next sensor; see
 /// [`Calibration::prior`](crate::Calibration::prior).
 ///
 /// ```no_run
@@ -24,10 +24,10 @@ pub struct Prior {
 }
 
 impl Prior {
-    /// Learns from calibrated sensors, at least three.
+    /// Learns a prior from at least three calibrated sensors.
     ///
     /// # Errors
-    /// If they are too few, or of different quantities.
+    /// If there are too few of them, or if they are of different quantities.
     ///
     /// ```
     /// let sensor = ohmstrain::Sensor::from_toml(&std::fs::read_to_string("examples/sensor.toml")?)?;
@@ -43,8 +43,8 @@ impl Prior {
     /// Reads the text of a `prior.toml`.
     ///
     /// # Errors
-    /// With line and column if it is no TOML, of another version, has a field that is unknown or missing or a number that
-    /// no make can have.
+    /// With line and column if it is not TOML, is of another version, has an unknown or a missing field, or a number out of its
+    /// range.
     ///
     /// ```
     /// let error = ohmstrain::Prior::from_toml("format = 4").unwrap_err();
@@ -54,7 +54,7 @@ impl Prior {
         Ok(Self { params: text::parse(text)? })
     }
 
-    /// The text of its `prior.toml`: what [`Self::from_toml`] reads.
+    /// Returns the text of its `prior.toml`, which [`Self::from_toml`] reads.
     ///
     /// # Errors
     /// If a number is out of its range.
@@ -69,7 +69,7 @@ impl Prior {
         Ok(toml::to_string(&self.params)?)
     }
 
-    /// All its numbers.
+    /// Returns all its numbers.
     ///
     /// ```
     /// fn tell(prior: &ohmstrain::Prior) {

@@ -2,19 +2,21 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Estimate, KNOWN_BEYOND, Known, Sensor};
 
-/// Time for which readings must be quiet before a question is asked, s.
+/// Duration for which readings must be quiet before a question is asked, s.
 const QUIET_S: f64 = 30.0;
-/// Range of quiet readings, in ranges of the calibration's readings.
+/// Largest range of quiet readings, as a share of the range of the calibration's readings.
 const BAND: f64 = 0.02;
-/// Largest distance of quiet readings from the rested sensor's reading, or from the end of this run's readings on that side, in the same ranges.
+/// Largest distance of quiet readings from the rested sensor's reading, or from this run's extreme reading on the side of rest,
+/// as the same share.
 const NEAR: f64 = 0.1;
-/// Distance that readings must have gone for that end to be one, and that they go from a hold before the next question.
+/// Travel of the readings from which that extreme counts, and by which they must leave a hold before the next question, as the
+/// same share.
 const AWAY: f64 = 0.3;
-/// Smallest estimated strain, in either direction, that is worth a question, in spans of the limits.
+/// Smallest estimated strain, in either direction, that is worth a question, as a share of the limits' span.
 const WORTH: f64 = 0.02;
-/// No reading for so long ends a quiet hold, s.
+/// Pause of the readings that ends a quiet hold, s.
 const PAUSE_S: f64 = 5.0;
-/// Questions in a run, at most.
+/// Largest number of questions in a run.
 const MOST: usize = 3;
 
 /// Watch for long holds that may be rests, whose strain the user may know.
@@ -34,16 +36,16 @@ pub struct QuietWatch {
     rested: f64,
     /// Range of the calibration's readings.
     range: f64,
-    /// 1 where readings grow with the strain, -1 where they fall.
+    /// 1 if readings grow with the strain, -1 if they fall.
     sign: f64,
-    /// The last readings of the run on the side of rest and on the other one, times that sign.
+    /// Extreme readings of the run on the side of rest and on the other side, times that sign.
     ends: (f64, f64),
-    /// Least strain that is worth a question, none if the sensor never reports none.
+    /// Smallest strain that is worth a question; `None` if the sensor never reports zero strain.
     worth: Option<f64>,
     known: Vec<Known>,
     hold: Option<Hold>,
     asked: usize,
-    /// The reading that was asked of last, as long as readings stay near it.
+    /// Reading at the last question, as long as readings stay near it.
     asked_at: Option<f64>,
 }
 
@@ -57,7 +59,7 @@ struct Hold {
     asked: bool,
 }
 
-/// A hold that may be a rest; a known strain of zero at [`Self::now_s`] tells that it is.
+/// A hold that may be a rest. If it is, the user can give a known strain of zero at [`Self::now_s`].
 ///
 /// ```
 /// let quiet = ohmstrain::Quiet { from_s: 12.0, now_s: 42.1, strain: 0.031 };
@@ -105,8 +107,8 @@ impl QuietWatch {
         (self.ends, self.hold, self.asked, self.asked_at) = (seen.ends, seen.hold, seen.asked, seen.asked_at);
     }
 
-    /// Creates a watch for a sensor that reads `rest_resistance` at rest, if that differs from calibration, and for strains that are
-    /// known anyway.
+    /// Creates a watch. `rest_resistance` is the reading of the rested sensor, if it differs from that in calibration; `known`
+    /// are strains that need no question.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -129,7 +131,7 @@ impl QuietWatch {
         Self { rested, range, sign, ends, worth, known: known.to_vec(), hold: None, asked: 0, asked_at: None }
     }
 
-    /// Takes a row; what to ask of the hold that it belongs to, once.
+    /// Takes a row, and returns the question about its hold, once.
     ///
     /// ```
     /// fn ask(watch: &mut ohmstrain::QuietWatch, row: &ohmstrain::Estimate) {
@@ -181,7 +183,7 @@ mod tests {
         Sensor::from_toml(include_str!("../examples/sensor.toml")).unwrap()
     }
 
-    /// Returns the questions asked for readings every 0.1 s, whose estimated strain is `strain`.
+    /// Returns the questions asked about readings every 0.1 s whose estimated strain is `strain`.
     fn asked(known: &[Known], strain: f64, reading: impl Fn(u32) -> f64) -> Vec<Quiet> {
         let sensor = sensor();
         let mut watch = QuietWatch::new(&sensor, None, known);
@@ -199,12 +201,12 @@ mod tests {
         let (rested, seen) = (sensor.params().rested(), sensor.params().validity);
         let range = seen.reading_upper - seen.reading_lower;
         let noise = |k: u32| 0.005 * range * f64::from(k * 7919 % 11) / 11.0;
-        // Twenty minutes of rest are one hold.
+        // Twenty minutes of rest form one hold.
         let rest = |k| rested + noise(k);
         let quiet = asked(&[], 0.03, rest);
         assert_eq!(quiet.len(), 1);
         assert!((quiet[0].now_s - quiet[0].from_s - QUIET_S).abs() < 0.11 && quiet[0].strain == 0.03, "{quiet:?}");
-        // Where the strain is said to be none, or is known, or the number is stuck, or readings are far from rest: nothing.
+        // No question if the strain is estimated as zero or is known, if the number is stuck, or if readings are far from rest.
         assert_eq!(asked(&[], 0.0, rest), []);
         assert_eq!(asked(&[Known::new(12.0, 0.0)], 0.03, rest), []);
         assert_eq!(asked(&[], 0.03, |_| rested), []);
@@ -212,11 +214,11 @@ mod tests {
         // Motion, and a drift that never settles.
         assert_eq!(asked(&[], 0.03, |k| rested + 0.05 * range * (0.1 * f64::from(k)).sin()), []);
         assert_eq!(asked(&[], 0.03, |k| rested + range * (1e-4 * f64::from(k) - 0.6)), []);
-        // Twenty rests with motion in between, also where R0 is another: no more than three questions.
+        // Twenty rests with motion in between, also with another R0: no more than three questions.
         for moved in [0.0, 0.5 * range] {
             let rests = |k: u32| rested + moved + if k % 600 < 50 { 0.5 * range } else { noise(k) };
             assert_eq!(asked(&[], 0.03, rests).len(), MOST);
-            // Without motion all of them are one.
+            // Without motion they form one hold.
             let broken = |k: u32| rested + if k % 600 < 50 { 0.05 * range } else { noise(k) };
             assert_eq!(asked(&[], 0.03, broken).len(), 1);
         }

@@ -1,5 +1,5 @@
-/// One reading of a sensor, in the unit of its calibration: Ω, or a ratio. A number, or an `Option` of one, becomes a
-/// reading by itself.
+/// One reading of a sensor, in the unit of its calibration: Ω, or a ratio. A number, or an `Option` of one, converts into a
+/// reading.
 ///
 /// ```
 /// use ohmstrain::Reading;
@@ -13,19 +13,19 @@ pub struct Reading {
     pub value: f64,
     /// Standard deviation that the electronics add to the sensor's own, in the same unit; 0 if unknown.
     pub sd: f64,
-    /// True if a converter stood at an end of its scale, so that there is no value.
+    /// True if a converter was at an end of its scale, so that there is no value.
     pub saturated: bool,
 }
 
 impl Reading {
-    /// No reading.
+    /// A missing reading.
     ///
     /// ```
     /// assert!(ohmstrain::Reading::MISSING.value.is_nan());
     /// ```
     pub const MISSING: Self = Self { value: f64::NAN, sd: 0.0, saturated: false };
 
-    /// Relative to R₀, R/R₀ - 1, as the kernels of `ohmstrain-ekf` take it; `None` without a value.
+    /// Returns the reading relative to R₀, R/R₀ - 1, as the kernels of `ohmstrain-ekf` take it; `None` without a value.
     ///
     /// ```
     /// let relative = ohmstrain::Reading::from(1760.0).relative(1600.0).unwrap();

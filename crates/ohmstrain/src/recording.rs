@@ -3,7 +3,7 @@ use ohmstrain_sensor::{JointParams, Quantity, ReadingUnit, Scores};
 
 use crate::{Error, Sensor};
 
-/// A recording with known strain, to calibrate on or to compare with.
+/// A recording with known strain, for calibration or comparison.
 ///
 /// ```
 /// use ohmstrain::Recording;
@@ -25,11 +25,11 @@ pub struct Recording<'a> {
 }
 
 impl<'a> Recording<'a> {
-    /// Times, s, that increase; positive readings, Ω; and true strains, 0.1 for 10 %. NaN stands for a missing reading or
-    /// strain.
+    /// Creates a recording from increasing times, s, positive readings, Ω, and true strains, 0.1 for 10 %. A missing reading or
+    /// strain is NaN.
     ///
     /// # Errors
-    /// The first row that is not as it must be, or lengths that differ.
+    /// The first invalid row, or lengths that differ.
     ///
     /// ```
     /// let (time_s, ohm, strain) = ([0.0, 0.1], [1600.0, 1610.0], [0.00, 0.01]);
@@ -50,11 +50,11 @@ impl<'a> Recording<'a> {
         })
     }
 
-    /// Standard deviations of the true strains, as [`marked_references`](crate::marked_references()) has them: calibrated intervals cover
-    /// the reference's error, too.
+    /// Sets standard deviations of the true strains, as [`marked_references`](crate::marked_references()) returns them.
+    /// Calibrated intervals then cover the reference's error, too.
     ///
     /// # Errors
-    /// If there are not as many as strains, or one of a known strain is negative or NaN.
+    /// If their number differs from that of the strains, or one of a known strain is negative or NaN.
     ///
     /// ```
     /// let recording = ohmstrain::Recording::new(&[0.0, 0.1], &[1600.0, 1610.0], &[0.00, 0.01])?;
@@ -66,7 +66,7 @@ impl<'a> Recording<'a> {
         Ok(Self { samples: self.samples.with_strain_sd(strain_sd)?, ..self })
     }
 
-    /// The readings are ratios to some resistance at rest.
+    /// States that the readings are ratios to some resistance at rest.
     ///
     /// ```
     /// let recording = ohmstrain::Recording::new(&[0.0, 0.1], &[1.00, 1.01], &[0.00, 0.01])?.of_ratios();
@@ -77,7 +77,7 @@ impl<'a> Recording<'a> {
         Self { reading: ReadingUnit::Ratio, ..self }
     }
 
-    /// The reference is an angle in degrees, and an angle is what the sensor shall estimate.
+    /// States that the reference is an angle in degrees; the sensor will then estimate an angle.
     ///
     /// ```
     /// let recording = ohmstrain::Recording::new(&[0.0, 0.1], &[1600.0, 1610.0], &[0.0, 3.5])?.of_angles_deg();
@@ -88,7 +88,7 @@ impl<'a> Recording<'a> {
         Self { quantity: Quantity::AngleDeg, ..self }
     }
 
-    /// States that the strains are fractions: [`calibration_doubts`](crate::calibration_doubts) does not ask.
+    /// States that the strains are fractions, which [`calibration_doubts`](crate::calibration_doubts) then does not doubt.
     ///
     /// ```
     /// let balloon = ohmstrain::Recording::new(&[0.0, 0.1], &[1600.0, 9000.0], &[0.0, 4.5])?.strain_unit_is_known();
@@ -100,7 +100,7 @@ impl<'a> Recording<'a> {
         Self { knows_strain_unit: true, ..self }
     }
 
-    /// States that the clock counts seconds: [`motion_doubts`](crate::motion_doubts) does not ask.
+    /// States that the clock counts seconds, which [`motion_doubts`](crate::motion_doubts) then does not doubt.
     ///
     /// ```
     /// let slow = ohmstrain::Recording::new(&[0.0, 60.0], &[1600.0, 1610.0], &[0.00, 0.01])?.clock_is_known();
@@ -112,7 +112,7 @@ impl<'a> Recording<'a> {
         Self { knows_clock: true, ..self }
     }
 
-    /// States that the readings are in Ω, as electronics also do.
+    /// States that the readings are in Ω, as electronics do, too.
     ///
     /// ```
     /// let small = ohmstrain::Recording::new(&[0.0, 0.1], &[1.6, 1.7], &[0.0, 0.1])?.resistance_unit_is_known();
@@ -124,7 +124,7 @@ impl<'a> Recording<'a> {
         Self { knows_resistance_unit: true, ..self }
     }
 
-    /// The file that it was read from, by name and SHA-256 of its bytes, hexadecimal: the sensor then remembers it.
+    /// Names the file that it was read from, with the SHA-256 of its bytes, hexadecimal. The sensor stores both.
     ///
     /// ```
     /// let hash = "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855";
@@ -136,7 +136,7 @@ impl<'a> Recording<'a> {
         Self { file: Some((name, sha256)), ..self }
     }
 
-    /// The sensor is glued across this joint.
+    /// Sets the joint that the sensor is glued across.
     ///
     /// ```
     /// use ohmstrain::{JointParams, Recording};
@@ -165,16 +165,16 @@ impl<'a> Recording<'a> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Evaluation {
-    /// The filter's.
+    /// Scores of the filter.
     pub filter: Scores,
-    /// The smoother's.
+    /// Scores of the smoother.
     pub smoother: Scores,
     /// Scores of strain as a cubic polynomial of the reading.
     pub static_cubic: Scores,
 }
 
 impl Sensor {
-    /// Filters and smooths a recording, without looking at its strain, and compares; `None` if it has no known strain.
+    /// Filters and smooths a recording without using its strain, and scores the estimates; `None` if it has no known strain.
     ///
     /// # Errors
     /// As [`Sensor::smooth`]; or if the recording is of another quantity or unit than the calibration.

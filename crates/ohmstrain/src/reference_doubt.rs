@@ -5,9 +5,9 @@ use ohmstrain_sensor::Quantity;
 use crate::Sensor;
 use crate::unit_doubt::quantile;
 
-/// References whose 95th percentile is this many times the largest strain of the calibration are a hundred times too large.
+/// Ratios of a reference's 95th percentile to the largest strain of the calibration that suggest a factor of a hundred.
 const PERCENT: RangeInclusive<f64> = 30.0..=300.0;
-/// No sensor that is glued or cast is stretched this much: a calibration with such strains was one in percent.
+/// Largest strain of a glued or cast sensor; a calibration with larger strains was probably in percent.
 const LARGEST_STRAIN: f64 = 3.0;
 
 /// A reference that seems to be in percent, or of a sensor that was calibrated in percent; see

@@ -11,7 +11,7 @@ use crate::estimate::check_rest;
 use crate::text;
 use crate::{Column, Error, Estimate, FilterBuilder, UnitDoubt};
 
-/// A calibrated sensor, checked: every number is in its range, and a filter can be made of it.
+/// A calibrated, checked sensor: every number is in its range, and a filter can be built from it.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -38,8 +38,8 @@ impl Sensor {
     /// Reads the text of a `sensor.toml`.
     ///
     /// # Errors
-    /// With line and column if it is no TOML, of another version, has a field that is unknown or missing or a number that
-    /// no sensor can have; or if no filter can be made of its default estimator.
+    /// With line and column if it is not TOML, is of another version, has an unknown or a missing field, or a number out of its
+    /// range; or if no filter can be built for its default estimator.
     ///
     /// ```
     /// let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -52,7 +52,7 @@ impl Sensor {
         Self::from_params(text::parse(text)?)
     }
 
-    /// Reads a sensor for use with one estimator, whatever the text's default is.
+    /// Reads a sensor for use with one estimator, whatever the default in the text is.
     ///
     /// # Errors
     /// As [`Self::from_toml`], for that estimator.
@@ -69,10 +69,10 @@ impl Sensor {
         Self::for_estimator(text::parse(text)?, Some(estimator))
     }
 
-    /// A sensor with these parameters.
+    /// Creates a sensor with these parameters.
     ///
     /// # Errors
-    /// Names the first number that is out of its range; or if no filter can be made of the default estimator.
+    /// Names the first number that is out of its range; or if no filter can be built for the default estimator.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -93,7 +93,7 @@ impl Sensor {
         Ok(sensor)
     }
 
-    /// A filter that shares what the others have learned.
+    /// Builds a filter that shares the learned correction.
     pub(crate) fn build(
         &self,
         kind: EstimatorKind,
@@ -102,15 +102,15 @@ impl Sensor {
         Ok(build_filter_with(&self.params, self.learned.as_ref(), Some(kind), options)?)
     }
 
-    /// A smoother that does.
+    /// Builds a smoother that shares the learned correction.
     pub(crate) fn build_smoother(&self, kind: EstimatorKind, options: &Options) -> Result<Box<dyn Smoother>, Error> {
         Ok(build_smoother_with(&self.params, self.learned.as_ref(), Some(kind), options)?)
     }
 
-    /// The text of its `sensor.toml`: what [`Self::from_toml`] reads.
+    /// Returns the text of its `sensor.toml`, which [`Self::from_toml`] reads.
     ///
     /// # Errors
-    /// If TOML cannot hold a number.
+    /// If TOML cannot represent a number.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -125,7 +125,7 @@ impl Sensor {
         Ok(toml::to_string(self.params())?)
     }
 
-    /// All its numbers.
+    /// Returns all its numbers.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -157,8 +157,8 @@ impl Sensor {
         Arc::unwrap_or_clone(self.params)
     }
 
-    /// R₀ of the law, which everything is relative to, in the unit of the readings: the calibration's, or, if
-    /// `rest_resistance` is what the rested sensor reads now, where that moves it.
+    /// Returns R₀ of the law, to which everything is relative, in the unit of the readings. It is the calibration's, or, if the
+    /// rested sensor now reads `rest_resistance`, scaled accordingly.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -171,11 +171,11 @@ impl Sensor {
         rest_resistance.map_or(self.params.rest_reading, |measured| self.params.rest_reading_of(measured))
     }
 
-    /// The sensor glued across a joint: estimates then have an angle, too. A sensor that was calibrated in degrees needs
-    /// no joint and stays as it is.
+    /// Mounts the sensor across a joint: estimates then have an angle, too. A sensor calibrated in degrees needs no joint and
+    /// stays as it is.
     ///
     /// # Errors
-    /// If no sensor can sit on that joint.
+    /// If the joint is invalid.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -198,7 +198,7 @@ impl Sensor {
     /// Checks that the rested sensor can read `measured`.
     ///
     /// # Errors
-    /// If it is not positive, or farther from what the rested sensor read in calibration than by a factor of
+    /// If it is not positive, or differs from the rested sensor's reading in calibration by more than a factor of
     /// [`FARTHEST_REST`](crate::FARTHEST_REST).
     ///
     /// ```
@@ -213,13 +213,13 @@ impl Sensor {
         check_rest(self.params.rested(), measured)
     }
 
-    /// The joint that it sits on, if there is one.
+    /// Returns the joint that it is mounted on, if there is one.
     pub(crate) fn joint(&self) -> Result<Option<Joint<f64>>, Error> {
         let joint = |joint: JointParams| Joint::new(joint.prestrain, joint.moment_arm_mm, joint.gauge_length_mm);
         self.params.joint.map(joint).transpose().map_err(Error::Joint)
     }
 
-    /// A filter to be set up and built.
+    /// Returns the builder of a filter.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -236,12 +236,12 @@ impl Sensor {
         FilterBuilder::new(self)
     }
 
-    /// Estimates of a whole recording, each from all readings; NaN stands for a missing one. See
-    /// [`FilterBuilder::smooth`] for more choice.
+    /// Smooths a whole recording: each estimate uses all readings; a missing reading is NaN. See [`FilterBuilder::smooth`] for
+    /// more options.
     ///
     /// # Errors
-    /// If the slices differ in length, a time or a reading cannot be taken, or the readings seem to be in another unit than
-    /// the calibration's.
+    /// If the slices differ in length, a time or a reading is invalid, or the readings seem to be in another unit than the
+    /// calibration's.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -254,7 +254,7 @@ impl Sensor {
         self.filter().smooth(time_s, readings)
     }
 
-    /// The columns of its `estimates.csv`, in order.
+    /// Returns the columns of its `estimates.csv`, in order.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -272,7 +272,7 @@ impl Sensor {
     /// sensor, if it differs from that in calibration.
     ///
     /// # Errors
-    /// If they are far from those of the calibration, and would not be in another unit.
+    /// If they are far from those of the calibration, and would not be so in another unit.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;

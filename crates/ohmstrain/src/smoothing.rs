@@ -9,9 +9,9 @@ use crate::known::{KnownOfAll, in_order, next_until};
 use crate::pauses::Pauses;
 use crate::{Error, Estimate, FilterBuilder, Reading};
 
-/// Whole recordings.
+/// Smoothing of whole recordings.
 impl FilterBuilder<'_> {
-    /// Estimates of a whole recording, each from all readings; NaN stands for a missing one.
+    /// Smooths a whole recording: each estimate uses all readings; a missing reading is NaN.
     ///
     /// # Errors
     /// As [`Sensor::smooth`](crate::Sensor::smooth).
@@ -41,11 +41,11 @@ impl FilterBuilder<'_> {
         Ok(rows)
     }
 
-    /// Smooths a recording that is too long to hold its estimates in memory: `row` gives time, s, and reading of each of
-    /// `len` rows; `take` gets the estimates segment by segment, the last segment first, each in order of time.
+    /// Smooths a recording whose estimates do not fit into memory. `row` returns time, s, and reading of each of `len` rows;
+    /// `take` receives the estimates segment by segment, the last segment first, each in order of time.
     ///
     /// # Errors
-    /// As [`Self::build`]; the row that cannot be taken; or the error of `take`.
+    /// As [`Self::build`]; the row that was refused; or the error of `take`.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -69,7 +69,7 @@ impl FilterBuilder<'_> {
         self.smooth_with(len, row, |_, time_s, estimated| known.correct(time_s, estimated), take)
     }
 
-    /// Computes the errors at known strains for all rows of a recording. The recording is smoothed once for the estimates there.
+    /// Computes the errors at known strains for all rows of a recording. That takes a smoothing pass of its own.
     fn known_of_all(self, len: usize, row: &impl Fn(usize) -> (f64, Reading)) -> Result<KnownOfAll, Error> {
         let scale = Scale::new(self.sensor)?;
         let mut due = in_order(self.known, &scale)?;
@@ -96,7 +96,8 @@ impl FilterBuilder<'_> {
         Ok(KnownOfAll::new(scale.limits(), known.into_iter().map(|known| known.1).collect()))
     }
 
-    /// Smooths; `known` gets row, time, s, and estimated strain, and returns the strain corrected by known ones.
+    /// Smooths a recording; `known` receives row, time, s, and estimated strain, and returns the strain corrected by known
+    /// ones.
     fn smooth_with<E: From<Error>>(
         self,
         len: usize,
@@ -125,7 +126,7 @@ impl FilterBuilder<'_> {
         let mut back = smoother.way_back(Rows::new(len, &relative)).map_err(failed)?;
         let (mut outputs, mut estimates, mut first) = (Vec::new(), Vec::new(), len);
         let start_s = if len > 0 { row(0).0 } else { 0.0 };
-        // Time of the reading after the row.
+        // Time of the next reading after the row, s.
         let mut next_s = if len > 0 { row(len - 1).0 } else { 0.0 };
         let mut pauses = doubts.map(|doubts| Pauses::new(doubts.unread()));
         while let Some(rows) = back.next_segment(&mut outputs).map_err(failed)? {
@@ -137,7 +138,7 @@ impl FilterBuilder<'_> {
                 output.rest_off = off;
                 if let Some(doubts) = doubts.as_mut().filter(|_| k > 0 || !starts_known) {
                     let estimate = &output.estimate;
-                    // Doubts are of readings as calibration would have had them, but for the session's R₀.
+                    // Doubts refer to readings relative to calibration, corrected for the session's R₀.
                     let taken = output.verdict.is_taken().then(|| (calibrated(k).1, output.nis));
                     let of_session = |reading| follower.map_or(reading, |follower| follower.of_session(reading));
                     let taken = taken.and_then(|(reading, nis)| Some((of_session(reading?.value), nis.unwrap_or(0.0))));

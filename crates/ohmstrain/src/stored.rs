@@ -16,7 +16,7 @@ const FORMAT: u32 = 2;
 
 /// A running filter between two rows: the content of a state file. [`Filter::store`](crate::Filter::store) makes it.
 ///
-/// It names its sensor, options and version, and resumes with those alone.
+/// It contains its sensor, options and version, and resumes only with the same ones.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stored {
@@ -26,11 +26,11 @@ pub struct Stored {
     sensor: String,
     options: StoredOptions,
     lag_s: Option<f64>,
-    /// Reading of the rested sensor as given by the user, for the program around the filter.
+    /// Reading of the rested sensor as the user gave it, for the program around the filter.
     pub rest_resistance: Option<f64>,
-    /// The clock of the stream that was read, for what stands around the filter.
+    /// Clock of the stream that was read, for the program around the filter.
     pub clock: Option<StoredClock>,
-    /// The moment that is 0 s, ns since 1970, of a table of dates and times.
+    /// Time of 0 s, ns since 1970, in a table with dates and times.
     pub zero_ns: Option<i64>,
     /// State of the watch for use outside the calibrated range.
     pub validity: Option<ValiditySeen>,
@@ -44,7 +44,7 @@ pub struct Stored {
     pub(crate) kernel: StoredKernel,
 }
 
-/// Last time of a stream: in seconds, or a counter of microseconds as it came, and without its wraps.
+/// Last time of a stream: in seconds, or a counter of microseconds, both raw and without wraps.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
 pub enum StoredClock {
@@ -52,7 +52,7 @@ pub enum StoredClock {
     TimeS(f64),
     /// Microseconds.
     TimeUs {
-        /// Counter as it came.
+        /// Raw counter.
         counter: u64,
         /// Counter without wraps.
         unwrapped: u64,
@@ -63,7 +63,7 @@ pub enum StoredClock {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum StoredError {
-    /// The text is no state.
+    /// The text is not a state.
     #[error("expected the state of a filter, as `filter --save-state` or Python's `save` writes it: {}", .0.message())]
     Text(Box<toml::de::Error>),
     /// State of another format or version of the program.
@@ -86,18 +86,18 @@ pub enum StoredError {
     Options {
         /// Name of the option.
         name: &'static str,
-        /// This filter's.
+        /// Value of this filter.
         expected: String,
-        /// The state's.
+        /// Value in the state.
         found: String,
     },
-    /// An initial strain of a filter that has begun.
+    /// An initial strain for a filter that has begun.
     #[error("initial strain: the first row is over in a state that is resumed; say `known` strains instead")]
     Begun,
-    /// Rows are still to be handed out.
+    /// Rows that are due have not been returned.
     #[error("rows that have become due are still to be handed out: take another row first")]
     RowsDue,
-    /// The numbers are none of such a filter.
+    /// The numbers do not belong to such a filter.
     #[error("the state is damaged: {}", .0.message())]
     Content(Box<toml::de::Error>),
 }
@@ -109,7 +109,7 @@ pub(crate) struct MadeOf {
     pub options: StoredOptions,
 }
 
-/// Options of a filter, in the form of flags.
+/// Options of a filter, in the form of command-line flags.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct StoredOptions {
@@ -134,7 +134,7 @@ pub(crate) struct WaitingRow {
     pub reading: Reading,
 }
 
-/// A strain that will be known.
+/// A strain known at a later time.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Ahead {
@@ -187,7 +187,7 @@ impl StoredOptions {
         }
     }
 
-    /// The first that differs.
+    /// Refuses the first option that differs.
     fn compare(&self, found: &Self) -> Result<(), StoredError> {
         let number = |gate: Option<f64>| gate.map_or_else(|| "none".to_owned(), |gate| gate.to_string());
         let list = |names: &[String]| if names.is_empty() { "nothing".to_owned() } else { names.join(",") };
@@ -231,7 +231,7 @@ impl Stored {
     /// Reads the text of a state file.
     ///
     /// # Errors
-    /// If it is none, or of another version.
+    /// If it is not one, or is of another version.
     ///
     /// ```
     /// let error = ohmstrain::Stored::from_toml("format = 0\nmade_by = 'ohmstrain 0.0.1'\n[kernel]").unwrap_err();
@@ -242,7 +242,7 @@ impl Stored {
         struct Version {
             format: u32,
             made_by: String,
-            /// Table that no other file with a format and a maker has.
+            /// Table that distinguishes it from other files with a format and a maker.
             #[serde(rename = "kernel")]
             _kernel: IgnoredAny,
         }
@@ -254,10 +254,10 @@ impl Stored {
         Ok(toml::from_str(text).map_err(refused)?)
     }
 
-    /// The text of its state file.
+    /// Returns the text of its state file.
     ///
     /// # Errors
-    /// If TOML cannot hold a number.
+    /// If TOML cannot represent a number.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;

@@ -6,10 +6,10 @@ use ohmstrain_sensor::{SensorParams, Unstated};
 
 use crate::{Error, Reading, Sensor, Tested};
 
-/// Least number of rows for a score.
+/// Smallest number of rows for a score.
 const FEWEST_ROWS: usize = 10;
 
-/// A recording of which only some rows were calibrated on.
+/// A recording of which only some rows were used for calibration.
 ///
 /// ```
 /// use ohmstrain::{Kept, Reading};
@@ -25,7 +25,7 @@ pub struct Kept<'a> {
     pub len: usize,
     /// Returns time, s, reading and reference of a row; NaN where the reference is unknown.
     pub row: &'a dyn Fn(usize) -> (f64, Reading, f64),
-    /// The rows that were calibrated on.
+    /// Rows that were used for calibration.
     pub seen: Range<usize>,
 }
 
@@ -36,7 +36,7 @@ impl fmt::Debug for Kept<'_> {
     }
 }
 
-/// Rows of filter, smoother and static cubic, one recording after the other.
+/// Rows of filter, smoother and static cubic, one recording after another.
 #[derive(Default)]
 struct EvaluatedRows {
     filter: Vec<ScoredRow>,
@@ -45,12 +45,12 @@ struct EvaluatedRows {
 }
 
 impl Sensor {
-    /// Scores the default estimator on all rows that were kept from its calibration, as it would run live. The sensor that is returned
-    /// keeps the scores, and states the errors that were larger than its intervals. The scores are `None`, and the sensor is as it
-    /// was, if there are few such rows, if their reference is constant, or if the filter refuses a row.
+    /// Scores the default estimator on all rows that were kept from its calibration, as it would run live. The returned sensor
+    /// stores the scores, and covers errors beyond its intervals by widening them. The scores are `None`, and the sensor is
+    /// unchanged, if there are few such rows, if their reference is constant, or if the filter refuses a row.
     ///
     /// # Errors
-    /// If the sensor that it becomes is no sensor; none is known.
+    /// If the resulting sensor is invalid; no case is known.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -89,7 +89,7 @@ impl Sensor {
 }
 
 impl EvaluatedRows {
-    /// Filter, smoother and cubic run over the whole recording.
+    /// Runs filter, smoother and cubic over a whole recording, and adds the held-out rows.
     fn add(&mut self, Kept { len, row, seen }: &Kept, sensor: &Sensor) -> Option<()> {
         let mut filter = sensor.filter().build().ok()?;
         let mut cubic = running_cubic(sensor.params().static_cubic);
@@ -103,7 +103,7 @@ impl EvaluatedRows {
             Ok::<(), Error>(())
         };
         sensor.filter().smooth_backward(*len, read, keep).ok()?;
-        // Times go on from recording to recording, so that none goes back.
+        // Times continue from recording to recording, so that none goes backwards.
         let after = self.filter.last().map_or(0.0, |row| row.time_s);
         let first_s = if *len > 0 { row(0).0 } else { 0.0 };
         for (k, smoothed) in smoothed.into_iter().enumerate() {

@@ -1,4 +1,4 @@
-//! `sensor.toml` and `prior.toml` as text: in, with the place of what is wrong.
+//! Text form of `sensor.toml` and `prior.toml`, with the place of an error.
 
 #[cfg(feature = "calibrate")]
 use ohmstrain_calib::{CorrectionOfFormat8, PRIOR_FORMAT, Prior};
@@ -12,18 +12,18 @@ use toml::de::{DeArray, DeTable, Deserializer};
 
 use crate::error::{Place, TextCause, TextError};
 
-/// The one field that every version of the format has.
+/// The only field that every version of the format has.
 #[derive(Deserialize)]
 struct Version {
     format: u32,
 }
 
-/// Content of a text with a version.
+/// Content of a text with a format version.
 pub(crate) trait Document: DeserializeOwned {
-    /// The version that is read.
+    /// Version that is read.
     const FORMAT: u32;
 
-    /// Names the first number that is out of its range.
+    /// Checks all numbers; the error names the first that is out of its range.
     fn check(&self) -> Result<(), FieldError>;
 
     /// Converts a document of an older version; `None` if it cannot be converted.
@@ -68,7 +68,7 @@ impl Document for Prior {
     }
 }
 
-/// Parameters of which every number is in its range.
+/// Parses parameters, and checks that every number is in its range.
 pub(crate) fn parse<D: Document>(text: &str) -> Result<D, TextError> {
     let no_toml = |error: toml::de::Error| TextError {
         place: error.span().map(|span| position(text, span.start)),
@@ -92,11 +92,11 @@ pub(crate) fn parse<D: Document>(text: &str) -> Result<D, TextError> {
     }
 }
 
-/// The version of a document.
+/// Returns the version of a document.
 fn format_of(document: &Spanned<DeTable<'_>>, text: &str) -> Result<u32, toml::de::Error> {
     let number = document.get_ref().get("format").and_then(|value| value.get_ref().as_integer());
     let known = number.and_then(|number| u32::from_str_radix(number.as_str(), number.radix()).ok());
-    // The error of a document without one.
+    // If there is none, the parser states the error.
     known.map_or_else(|| toml::from_str::<Version>(text).map(|version| version.format), Ok)
 }
 
@@ -118,7 +118,7 @@ fn place_of(text: &str, field: &str) -> Option<Place> {
     start.map(|start| position(text, start))
 }
 
-/// Line and column of a byte.
+/// Returns line and column of a byte.
 fn position(text: &str, start: usize) -> Place {
     let before = text.get(..start).unwrap_or("");
     let line = before.matches('\n').count() + 1;

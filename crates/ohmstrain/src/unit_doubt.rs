@@ -1,12 +1,12 @@
 use ohmstrain_sensor::{ReadingUnit, SensorParams};
 
-/// Least median reading, Ω, that is not taken for kΩ, unless the unit is known.
+/// Smallest median reading, Ω, that is not taken for kΩ, unless the unit is known.
 pub(crate) const LEAST_OHM: f64 = 20.0;
 
-/// Readings may go this far beyond those of the calibration, and in another unit they would not: sensors of one kind differ
+/// Factor by which readings may lie outside those of the calibration before another unit is considered: sensors of one kind differ
 /// by less, units by more.
 const READINGS_BEYOND: f64 = 2.0;
-/// More is read where no sensor is, Ω.
+/// Resistance above which no sensor is connected, Ω.
 const LARGEST_OHM: f64 = 1e6;
 
 /// Readings that seem to be in another unit than the calibration's; see [`Sensor::check_unit`](crate::Sensor::check_unit).
@@ -57,7 +57,7 @@ pub enum UnitGuess {
 }
 
 impl UnitDoubt {
-    /// `None` if the readings are near those of the calibration, or far from them in a way that no unit explains.
+    /// Returns a doubt; `None` if the readings are near those of the calibration, or if no unit explains their distance.
     pub(crate) fn of(params: &SensorParams, rest: f64, readings: impl Iterator<Item = f64>) -> Option<Self> {
         let median = quantile(readings, 0.5)?;
         let moved = rest / params.rest_reading;
@@ -70,7 +70,7 @@ impl UnitDoubt {
                 (1e-3, UnitGuess::CalibrationInKiloOhm),
                 (rest, UnitGuess::Ratio),
             ],
-            // Of ohms nobody knows how many are the sensor's at rest.
+            // For ohms, the sensor's resistance at rest is unknown.
             ReadingUnit::Ratio if (LEAST_OHM..=LARGEST_OHM).contains(&median) => {
                 &[(1e-2, UnitGuess::Percent), (rest / median, UnitGuess::Ohm)]
             }
@@ -85,18 +85,18 @@ impl UnitDoubt {
 
 impl std::error::Error for UnitDoubt {}
 
-/// Known values that are looked at: of more, such as are evenly spread.
+/// Largest number of known values that are used; more values are thinned evenly.
 const LOOKED_AT: usize = 1 << 17;
 
-/// The value that a share of the known ones is below; `None` if none is known. Where there are many, its rank errs by less than one
-/// in ten thousand, and memory does not grow with their number.
+/// Returns the quantile of the known values at `share`; `None` if none is known. With many values, its rank errs by less than
+/// one in ten thousand, and memory does not grow with their number.
 pub(crate) fn quantile(values: impl Iterator<Item = f64>, share: f64) -> Option<f64> {
     let mut known = spread(values.filter(|value| value.is_finite()));
     let rank = (share * known.len().checked_sub(1)? as f64) as usize;
     Some(*known.select_nth_unstable_by(rank, f64::total_cmp).1)
 }
 
-/// All values, or at least half of [`LOOKED_AT`], each as far from the next as all others.
+/// Returns all values, or at least half of [`LOOKED_AT`], taken at a constant stride.
 fn spread(values: impl Iterator<Item = f64>) -> Vec<f64> {
     let (mut kept, mut apart) = (Vec::new(), 1);
     for (place, value) in values.enumerate() {
@@ -111,7 +111,7 @@ fn spread(values: impl Iterator<Item = f64>) -> Vec<f64> {
             });
             apart *= 2;
         }
-        // `LOOKED_AT` is even: what comes after halving is a multiple of the new distance.
+        // `LOOKED_AT` is even, so that the first index after halving is a multiple of the new stride.
         kept.push(value);
     }
     kept
@@ -121,8 +121,8 @@ fn spread(values: impl Iterator<Item = f64>) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// The quantiles of a ramp are known. A rank is rounded down to the one that is kept, and those after the last are not seen: each
-    /// time less than a distance, and there are at least `LOOKED_AT` / 2 of those.
+    /// Tests quantiles of a ramp, which are known. A rank is rounded down to a kept value, and values after the last kept one
+    /// are ignored: each errs by less than a stride, and at least `LOOKED_AT` / 2 values are kept.
     #[test]
     fn quantiles_of_long_recordings_take_little_memory() {
         for len in [1, 2, LOOKED_AT - 1, LOOKED_AT, LOOKED_AT + 1, 5 * LOOKED_AT + 3, 16 * LOOKED_AT] {

@@ -36,7 +36,7 @@ pub struct ValidityWatch {
     beyond_strains: Outside,
 }
 
-/// A use outside of what the calibration has seen; estimates are extrapolations.
+/// A use outside the calibrated range; estimates are extrapolations.
 ///
 /// ```
 /// use ohmstrain::{Beyond, Extrapolation};
@@ -46,7 +46,7 @@ pub struct ValidityWatch {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Extrapolation {
-    /// Time of the row at which it became clear, s.
+    /// Time of the row at which it was detected, s.
     pub time_s: f64,
     /// Kind of use.
     pub beyond: Beyond,
@@ -60,36 +60,36 @@ pub struct Extrapolation {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Beyond {
-    /// Longer run.
+    /// A run longer than any in calibration.
     Duration {
         /// Longest recording of the calibration, s.
         longest_s: f64,
     },
-    /// Higher rates.
+    /// Rates higher than in calibration.
     Rate {
         /// Quantity whose rate it is.
         quantity: Quantity,
         /// 99th percentile of the calibration, 1/s.
         fastest_per_s: f64,
     },
-    /// Other readings.
+    /// Readings outside the calibrated range.
     Readings {
         /// Name of their column.
         column: &'static str,
-        /// The least of the calibration, moved to the R₀ in use.
+        /// Smallest reading of the calibration, moved to the R₀ in use.
         least: f64,
-        /// The largest.
+        /// Largest reading of the calibration, moved to the R₀ in use.
         most: f64,
-        /// True if R₀ follows them, since it was not given.
+        /// True if R₀ adapts to them, since it was not given.
         follows: bool,
     },
-    /// Other strains.
+    /// Strains outside the calibrated range.
     Strain {
-        /// Quantity that is estimated.
+        /// Estimated quantity.
         quantity: Quantity,
-        /// The least of the calibration.
+        /// Smallest strain of the calibration.
         least: f64,
-        /// The largest.
+        /// Largest strain of the calibration.
         most: f64,
     },
 }
@@ -102,18 +102,18 @@ struct Outside {
     reported: bool,
 }
 
-/// Rows outside are a matter of chance up to this number and this share.
+/// Number and share of rows up to which rows outside are a matter of chance.
 const CHANCE: (usize, f64) = (10, 0.02);
-/// The fastest rate is a 99th percentile, of a reference, and estimated rates err: on the very rows of their calibrations
-/// filters of eleven public recordings go beyond it in up to a third of the rows, beyond this many times it for a second or
-/// two, but for the first seconds, in which they have yet to find the motion.
+/// Factor on the fastest rate, which is a 99th percentile of a reference, whereas estimated rates have errors. On the very rows
+/// of their calibrations, filters of eleven public recordings exceed the fastest rate in up to a third of the rows; they exceed
+/// this factor times it for a second or two, apart from the first seconds, in which they have yet to find the motion.
 const FASTER: f64 = 1.3;
 const FAST_BY_CHANCE: (usize, f64) = (20, 0.01);
 const FOUND_S: f64 = 10.0;
-/// A recording is as long as the calibration up to this many times its length.
+/// Factor on the longest recording of the calibration above which a run is longer.
 const LONGER: f64 = 1.05;
 
-/// R₀ of a session, where calibration knows several.
+/// R₀ of a session, if calibration had several sessions.
 #[derive(Clone, Debug)]
 struct Session {
     follower: RestFollower<f64>,
@@ -125,7 +125,7 @@ impl Session {
         Self { follower: RestFollower::new(params.rest_bounds()), rest_reading: params.rest_reading }
     }
 
-    /// The reading that the sensor would have given with calibration's R₀; NaN where it is missing.
+    /// Returns the reading that the sensor would have given with the calibration's R₀; NaN if it is missing.
     fn as_calibrated(&mut self, reading: f64) -> f64 {
         let relative = reading / self.rest_reading - 1.0;
         if relative.is_finite() {
@@ -187,8 +187,7 @@ impl ValidityWatch {
         }
     }
 
-    /// Watches the use of a sensor. `rest_resistance` is what the rested sensor reads now, if it is not what it read in
-    /// calibration.
+    /// Creates a watch. `rest_resistance` is the present reading of the rested sensor, if it differs from that in calibration.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -215,8 +214,8 @@ impl ValidityWatch {
         }
     }
 
-    /// Takes a row and returns new warnings: the reading as recorded, the estimated rate, and the true strain; NaN for
-    /// missing values. An uncertain rate is estimated near zero, so that a high one means something.
+    /// Takes a row, and returns new warnings. The row is the reading as recorded, the estimated rate and the true strain; NaN
+    /// for missing values. An uncertain rate is estimated near zero, so that a high one is significant.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -249,7 +248,7 @@ impl ValidityWatch {
             (is_other, Beyond::Readings { column, least, most, follows }),
             (is_beyond, Beyond::Strain { quantity, least: lower, most: upper }),
         ];
-        // Mostly there is nothing to say.
+        // Mostly there is no warning.
         let found = (is_long || is_fast || is_other || is_beyond).then_some(all);
         found.into_iter().flatten().filter_map(move |(now, beyond)| now.then_some(Extrapolation { time_s, beyond }))
     }

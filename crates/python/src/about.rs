@@ -1,4 +1,4 @@
-//! A table's readings and reference in their units, by the caller's answers or by the table's own metadata.
+//! Units of a table's readings and reference, from the caller's answers or the table's own metadata.
 
 use arrow_schema::Schema;
 use ohmstrain::{JointParams, Quantity};
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Place, raise};
 
-/// Data that a table does not contain: the lines above a trace CSV's header.
+/// Data that a table does not contain; in a trace CSV they stand above the header.
 #[derive(Debug, Default, Deserialize, Serialize, FromPyObject)]
 #[pyo3(from_item_all)]
 #[serde(default)]
@@ -21,7 +21,7 @@ pub struct About {
     pub resistance_unit: Option<String>,
 }
 
-/// Key of a schema's metadata under which `read` keeps what stands above a file's header, as JSON.
+/// Key of a schema's metadata under which `read` stores the lines above a file's header, as JSON.
 pub const ABOUT: &str = "ohmstrain";
 
 impl About {
@@ -29,7 +29,7 @@ impl About {
         Place { file: self.name.as_deref(), ..Place::default() }
     }
 
-    /// Completes it with the table's own metadata.
+    /// Completes the data with the table's own metadata.
     pub fn completed(self, schema: &Schema) -> PyResult<Self> {
         let Some(text) = schema.metadata().get(ABOUT) else { return Ok(self) };
         let known: Self = serde_json::from_str(text).map_err(|error| raise(&self.place(), &error.to_string()))?;
@@ -47,7 +47,7 @@ impl About {
         parsed("joint", self.joint.as_deref(), self.name.as_deref())
     }
 
-    /// The joint that the sensor sits on.
+    /// Returns the joint that the sensor is mounted on.
     pub fn joint(&self) -> PyResult<Option<JointParams>> {
         Ok(self.joint_spec()?.map(|joint| JointParams {
             prestrain: joint.prestrain,

@@ -22,7 +22,7 @@ pub struct Choices {
     gauge: Option<String>,
     /// The text of a `prior.toml`.
     prior: Option<String>,
-    /// True if a late reference is to be moved.
+    /// True if a late reference is moved.
     align: bool,
 }
 
@@ -55,7 +55,7 @@ impl Choices {
     }
 }
 
-/// The sensor behind recordings with a reference.
+/// Calibrates a sensor on recordings with a reference; returns it with the warnings.
 #[pyfunction]
 pub fn calibrate(py: Python, tables: Vec<(PyTable, About)>, choices: Choices) -> PyResult<(Sensor, Vec<String>)> {
     let mut recordings =
@@ -72,7 +72,7 @@ fn parsed(text: &str) -> PyResult<Prior> {
     Prior::from_toml(text).map_err(|error| of_library(&error, None))
 }
 
-/// Returns the prior that sensors of one make have in common, as the text of a `prior.toml`.
+/// Learns the common prior of sensors of one make, as the text of a `prior.toml`.
 #[pyfunction]
 pub fn fit_prior(py: Python, sensors: Vec<PyRef<Sensor>>) -> PyResult<String> {
     let sensors: Vec<ohmstrain::Sensor> = sensors.iter().map(|sensor| sensor.sensor.clone()).collect();
@@ -80,7 +80,7 @@ pub fn fit_prior(py: Python, sensors: Vec<PyRef<Sensor>>) -> PyResult<String> {
     text.map_err(|error| of_library(&error, None))
 }
 
-/// Refuses a text that is no prior.
+/// Refuses a text that is not a prior.
 #[pyfunction]
 pub fn check_prior(text: &str, file: Option<&str>) -> PyResult<()> {
     Prior::from_toml(text).map(|_| ()).map_err(|error| of_library(&error, file))
@@ -99,7 +99,7 @@ pub fn calibrated(
             return Err(raise(&place, "expected a reference (strain, displacement_mm or angle_deg), found none"));
         }
     }
-    // Unwinding is the one way out of a calibration.
+    // Unwinding is the only way to stop a calibration.
     let made = catch_unwind(AssertUnwindSafe(|| py.detach(|| run(recordings, rows, calibration))));
     let made = made.or_else(|stopped| match stopped.downcast::<PyErr>() {
         Ok(interrupt) => Err(*interrupt),
@@ -115,7 +115,7 @@ pub fn calibrated(
     Ok((Sensor { sensor: calibrated.sensor }, warnings))
 }
 
-/// Calibrates as the command line does: untrustworthy rows are left out first, and doubts are answered.
+/// Calibrates as the command line does: untrustworthy rows are left out first, and doubts are raised.
 fn run(
     recordings: &[Recording],
     rows: &[usize],
@@ -143,7 +143,7 @@ fn run(
     Ok((calibrated, warnings))
 }
 
-/// Calibrates on the first rows of a recording and scores the rest; the sensor, and scores as JSON.
+/// Calibrates on the first rows of a recording and scores the rest; returns the sensor, the warnings, and the scores as JSON.
 #[pyfunction]
 pub fn evaluate_split(
     py: Python,

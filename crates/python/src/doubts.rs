@@ -1,4 +1,4 @@
-//! Doubts of the library: refusals are raised, the rest are warnings.
+//! Doubts of the library: refusals are raised, the others are warnings.
 
 use ohmstrain::{CalibrationDoubt, Interface, Known, LagAnswer};
 use ohmstrain_calib::{Samples, aligned};
@@ -7,13 +7,13 @@ use pyo3::prelude::*;
 use crate::error::{Place, of_library, raise};
 use crate::recording::Recording;
 
-/// Name of a recording in messages: its own, or its place.
+/// Returns the name of a recording in messages: its own, or its number.
 pub fn called(recordings: &[Recording], place: usize) -> String {
     let name = recordings.get(place).and_then(|recording| recording.name.as_deref());
     name.map_or_else(|| format!("recording {}", place + 1), str::to_owned)
 }
 
-/// Warnings of doubts about a calibration; the first one that has to be answered is raised.
+/// Returns the warnings about a calibration; raises the first doubt that needs an answer.
 pub fn raised_or_warned(recordings: &[Recording], doubts: &[CalibrationDoubt]) -> PyResult<Vec<String>> {
     let mut warnings = Vec::new();
     for doubt in doubts {
@@ -28,7 +28,7 @@ pub fn raised_or_warned(recordings: &[Recording], doubts: &[CalibrationDoubt]) -
     Ok(warnings)
 }
 
-/// Moves references that are late if that is wanted; refuses those that are certainly too late, warns of those that may be.
+/// Moves late references if requested; refuses those that are certainly too late, and warns of those that may be.
 pub fn on_one_clock(recordings: &mut [Recording], align: bool) -> PyResult<Vec<String>> {
     let mut warnings = Vec::new();
     for place in 0..recordings.len() {
@@ -53,7 +53,7 @@ pub fn on_one_clock(recordings: &mut [Recording], align: bool) -> PyResult<Vec<S
     Ok(warnings)
 }
 
-/// Returns doubts about known strains, in a recording from the first to the last time, s.
+/// Returns doubts about known strains, in a recording whose first and last time, s, are `times`.
 pub fn of_known(sensor: &ohmstrain::Sensor, start: Option<f64>, known: &[Known], times: (f64, f64)) -> Vec<String> {
     let start = start.and_then(|start| sensor.check_start(start).err()).map(|doubt| doubt.text(Interface::Python));
     let unused = ohmstrain::unused_known(known, times).into_iter().map(|doubt| doubt.text(Interface::Python));

@@ -13,7 +13,7 @@ create_exception!(
 /// Place of an error.
 #[derive(Debug, Default)]
 pub struct Place<'a> {
-    /// File, or what a recording is called.
+    /// File, or name of a recording.
     pub file: Option<&'a str>,
     /// Row of a table, from zero.
     pub row: Option<usize>,
@@ -21,7 +21,7 @@ pub struct Place<'a> {
     pub column: Option<&'a str>,
 }
 
-/// The exception for a message about a place, which the message names first.
+/// Creates the exception for a message about a place, which the message names first.
 pub fn raise(place: &Place, message: &str) -> PyErr {
     let Place { file, row, column } = place;
     let parts = [
@@ -45,9 +45,9 @@ pub fn raise(place: &Place, message: &str) -> PyErr {
 /// Reason why rows were not processed to the end.
 #[derive(Debug)]
 pub enum Stopped {
-    /// The library refuses them.
+    /// The library refuses a row.
     Refused(Error),
-    /// Interruption by the user or another sender of a signal; or an exception with its reason.
+    /// An interrupt or another signal, or an exception that it raised.
     Interrupted(PyErr),
 }
 
@@ -57,7 +57,7 @@ impl From<Error> for Stopped {
     }
 }
 
-/// The exception of a signal, if one has come.
+/// Returns the exception of a signal that has arrived.
 pub fn heed() -> PyResult<()> {
     Python::attach(|py| py.check_signals())
 }

@@ -10,7 +10,7 @@ use crate::recording::Recording;
 /// Names of the scored estimators, and their scores as JSON.
 pub type Scored = Vec<(&'static str, String)>;
 
-/// Scores of filter, smoother and static cubic on the rows at a time or later; the filter starts at the first row.
+/// Scores filter, smoother and static cubic on the rows at a time or later; the filter starts at the first row.
 pub fn with_sensor(
     py: Python,
     recording: &Recording,
@@ -37,8 +37,8 @@ pub fn with_sensor(
     named(scores, file)
 }
 
-/// The same with the baselines that are fitted to the rows before `rows`, which calibrated the sensor; the sensor without
-/// its correction, too, if it has one.
+/// Scores them together with the baselines, fitted to the same first `rows` rows as the sensor; also the sensor without its
+/// correction, if it has one.
 pub fn after_split(py: Python, recording: &Recording, rows: usize, sensor: &Sensor) -> PyResult<Scored> {
     let (truth, file) = (truth(recording)?, recording.name.as_deref());
     let part = Part { recording, truth, first: rows };
@@ -64,7 +64,7 @@ fn fitted(recording: &Recording, rows: usize) -> Result<Baselines, CalibrationEr
     Baselines::fit(&screen(&samples)?.samples())
 }
 
-/// Fits the published law to the rows before `rows`, and gives it the phases.
+/// Fits the published law to the rows before `rows`, and supplies the phases.
 fn published(recording: &Recording, rows: usize, truth: &[f64]) -> Option<impl Baseline> {
     let (time_s, reading, strain) = recording.until(rows);
     let samples = [Samples::new(time_s, reading, strain.unwrap_or(&[])).ok()?];
@@ -93,7 +93,7 @@ fn named(scores: Vec<(&'static str, Option<Scores>)>, file: Option<&str>) -> PyR
     scores.into_iter().map(text).collect()
 }
 
-/// The rows that are scored: all from `first` on.
+/// The scored rows: all from `first` on.
 struct Part<'a> {
     recording: &'a Recording,
     truth: &'a [f64],

@@ -4,7 +4,7 @@ use pyo3::PyResult;
 
 use crate::error::{Place, raise};
 
-/// Paths and contents of an export's files; the table of what was promised and what it costs; the description of the filter.
+/// Paths and contents of an export's files; the table of its promise and cost; the description of the filter.
 pub type Exported = (Vec<(String, String)>, Vec<String>, String);
 
 /// Exports as `ohmstrain export` does.

@@ -8,7 +8,7 @@ use pyo3::types::PyDict;
 use crate::error::of_library;
 use crate::sensor::Sensor;
 
-/// Several sensors that see one strain.
+/// Several sensors that measure one strain.
 #[pyclass(frozen, module = "ohmstrain._core")]
 pub struct FusedSensor {
     sensor: ohmstrain::FusedSensor,

@@ -1,7 +1,7 @@
-//! The part of the Python package `ohmstrain` that is written in Rust: tables in, tables out, sensors and filters.
+//! Part of the Python package `ohmstrain` that is written in Rust: tables, sensors and filters.
 //!
-//! Tables come and go through the Arrow C data interface. The interpreter's lock is released while anything is computed.
-//! What the arguments mean is documented where Python users look: in `ohmstrain/__init__.py` and `sensor.py`.
+//! Tables are exchanged through the Arrow C data interface. The interpreter's lock is released during computations. Arguments
+//! are documented in the Python sources, `ohmstrain/__init__.py` and `_sensor.py`, where users look.
 
 mod about;
 mod calibration;

@@ -19,7 +19,7 @@ pub struct LiveFilter {
     sensor: ohmstrain::Sensor,
     columns: Vec<Column>,
     known: Vec<Known>,
-    /// The moment that was 0 s in the state that it goes on from, ns since 1970.
+    /// Time of 0 s in the state that it resumes from, ns since 1970.
     #[pyo3(get)]
     zero_ns: Option<i64>,
 }
@@ -31,15 +31,15 @@ struct Running {
     rest_resistance: Option<f64>,
 }
 
-/// A running filter that waits.
+/// A running fixed-lag filter.
 #[pyclass(frozen, module = "ohmstrain._core")]
 pub struct LaggedFilter {
     filter: Mutex<ohmstrain::LaggedFilter>,
     columns: Vec<Column>,
 }
 
-/// A filter for one caller at a time, who waits without the interpreter. A step either succeeds or leaves the filter as it
-/// was, also if it panics.
+/// Locks a filter for one caller at a time, who waits without holding the interpreter. A step either succeeds or leaves the
+/// filter as it was, even if it panics.
 fn locked<'a, T>(filter: &'a Mutex<T>, py: Python) -> MutexGuard<'a, T> {
     filter.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner)
 }
@@ -48,7 +48,7 @@ fn refused(error: Error) -> PyErr {
     of_library(&error, None)
 }
 
-/// A row as a dictionary with the names of the columns; `None` for what is not known.
+/// Converts a row to a dictionary with the names of the columns; `None` for unknown values.
 fn row<'py>(py: Python<'py>, columns: &[Column], row: &Estimate) -> PyResult<Bound<'py, PyDict>> {
     let cells = PyDict::new(py);
     for column in columns {
@@ -74,7 +74,7 @@ impl LiveFilter {
         Self::watched(filter, watch, sensor, columns, rest_resistance, known)
     }
 
-    /// One that goes on from a state.
+    /// Creates a filter that resumes from a state.
     pub(crate) fn resumed(
         filter: ohmstrain::Filter,
         sensor: ohmstrain::Sensor,
@@ -104,7 +104,7 @@ impl LiveFilter {
     }
 }
 
-/// The state in a text.
+/// Parses the text of a state.
 pub fn stored(text: &str, file: Option<&str>) -> PyResult<Stored> {
     Stored::from_toml(text).map_err(|error| of_library(&error, file))
 }
@@ -123,7 +123,7 @@ impl LiveFilter {
         row(py, &self.columns, &estimate)
     }
 
-    /// Takes the rows of a table, and goes on from the last one with the next.
+    /// Takes the rows of a table; the next call continues after the last one.
     fn run(&self, py: Python, table: PyTable, about: About) -> PyResult<Doubtful> {
         let recording = Recording::new(table, about)?;
         let mut running = locked(&self.running, py);
@@ -140,7 +140,7 @@ impl LiveFilter {
         Ok((estimates.into_batch()?, std::mem::take(&mut watch.warnings)))
     }
 
-    /// Stores all that the next row depends on, as TOML, with the moment that is 0 s.
+    /// Stores everything that the next row depends on, as TOML, with the time of 0 s.
     #[pyo3(signature = (zero_ns=None))]
     fn store(&self, py: Python, zero_ns: Option<i64>) -> PyResult<String> {
         let running = locked(&self.running, py);
@@ -175,7 +175,7 @@ impl LaggedFilter {
         rows.iter().map(|estimate| row(py, &self.columns, estimate)).collect()
     }
 
-    /// Stores all that the next row depends on, as TOML.
+    /// Stores everything that the next row depends on, as TOML.
     fn store(&self, py: Python) -> PyResult<String> {
         locked(&self.filter, py).store().and_then(|stored| stored.to_toml()).map_err(refused)
     }

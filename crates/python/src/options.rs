@@ -11,7 +11,7 @@ pub struct Options {
     correction: bool,
     /// Strain at the first row, if it is known.
     pub initial_strain: Option<f64>,
-    /// Strains that are known later.
+    /// Strains known at later times.
     #[pyo3(from_py_with = known)]
     pub known: Vec<Known>,
     rest_resistance: Option<Rest>,
@@ -44,7 +44,7 @@ impl Options {
         }
     }
 
-    /// The columns of a sensor's estimates that are wanted, all if none is named.
+    /// Returns the requested columns of a sensor's estimates; all if none is named.
     pub fn columns(&self, sensor: &Sensor) -> PyResult<Vec<Column>> {
         let known = sensor.columns();
         let Some(chosen) = &self.columns else { return Ok(known) };
@@ -63,7 +63,7 @@ impl Options {
         Self { correction: true, ..self }
     }
 
-    /// A sensor's filter as they want it.
+    /// Returns the builder of a sensor's filter with these options.
     pub fn builder<'a>(&'a self, sensor: &'a Sensor) -> PyResult<FilterBuilder<'a>> {
         let mut builder = sensor.filter().known(&self.known);
         if let Some(kind) = self.estimator.as_deref().map(estimator).transpose()?.flatten() {
@@ -88,13 +88,13 @@ impl Options {
     }
 }
 
-/// Known strains: time, strain and deviation, if there is one.
+/// Parses known strains: time, strain and, optionally, deviation.
 fn known(given: &Bound<PyAny>) -> PyResult<Vec<Known>> {
     let strains: Vec<(f64, f64, Option<f64>)> = given.extract()?;
     Ok(strains.into_iter().map(|(time_s, strain, sd)| Known { time_s, strain, sd }).collect())
 }
 
-/// An estimator by its name; `None` for `auto`.
+/// Returns an estimator by its name; `None` for `auto`.
 pub fn estimator(name: &str) -> PyResult<Option<EstimatorKind>> {
     if name == "auto" {
         return Ok(None);

@@ -1,4 +1,4 @@
-//! Files in: traces as the command line reads them, all others by the importer.
+//! Reading of files: traces as the command line reads them, all others by the importer.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -42,7 +42,7 @@ pub struct Arguments {
     resistance_unit: Option<String>,
 }
 
-/// A value of an argument, or the error that names the argument.
+/// Parses the value of an argument; an error names the argument.
 fn value<T: FromStr<Err: std::fmt::Display>>(argument: &str, text: &str) -> PyResult<T> {
     text.parse().map_err(|error: T::Err| raise(&Place::default(), &format!("{argument}: {error}, found `{text}`")))
 }
@@ -75,7 +75,7 @@ impl Arguments {
         let metadata = self.metadata()?;
         let mut units = pairs("units", &self.units, Ok)?;
         for (role, unit) in [("strain", &self.strain_unit), ("resistance", &self.resistance_unit)] {
-            // Before the arguments by role, which counts more.
+            // Inserted before the arguments by role, which override them.
             units.splice(0..0, unit.clone().map(|unit| Ok::<_, PyErr>((value("units", role)?, unit))).transpose()?);
         }
         Ok(Recipe {
@@ -109,7 +109,7 @@ impl Arguments {
     }
 }
 
-/// The recording in files, and what was taken for what, or left out, a line each.
+/// Reads the recording in files; returns remarks on the roles of columns and on data left out, one line each.
 #[pyfunction]
 pub fn read(py: Python, paths: Vec<String>, arguments: Arguments) -> PyResult<(PyRecordBatch, Vec<String>)> {
     let (recipe, metadata) = (arguments.recipe()?, arguments.metadata()?);
@@ -127,7 +127,7 @@ fn refused(error: impl std::fmt::Display) -> PyErr {
     raise(&Place::default(), &error.to_string())
 }
 
-/// A trace; `None` if the file is something else.
+/// Reads a trace; `None` if the file is something else.
 fn trace(path: &str, overrides: &Metadata) -> PyResult<Option<Trace>> {
     let mut file = File::open(path)?;
     let mut head = Vec::new();
@@ -147,10 +147,10 @@ fn trace(path: &str, overrides: &Metadata) -> PyResult<Option<Trace>> {
     }
 }
 
-/// Bytes that tell what a file is.
+/// Number of first bytes by which the kind of a file is recognised.
 const HEAD: u64 = 4096;
 
-/// A trace out of a lab's files.
+/// Imports a trace from a lab's files.
 fn imported(paths: &[String], recipe: &Recipe) -> PyResult<(Trace, Vec<String>)> {
     let table = |(index, path): (usize, &String)| {
         read_table(std::fs::read(path)?, path, &recipe.read_options(index)).map_err(refused)
@@ -161,7 +161,7 @@ fn imported(paths: &[String], recipe: &Recipe) -> PyResult<(Trace, Vec<String>)>
     Ok((imported.trace, imported.remarks))
 }
 
-/// Returns its columns, in the units that they have inside, and its other metadata in the schema's.
+/// Returns its columns in their internal units; the schema's metadata contain its other metadata.
 fn table(trace: &Trace, paths: &[String]) -> PyResult<PyRecordBatch> {
     let failed = |error: ArrowError| refused(error);
     let numbers = |values: &[f64]| -> ArrayRef {

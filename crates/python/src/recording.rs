@@ -1,4 +1,4 @@
-//! Recordings in tables: the columns of a trace CSV.
+//! Recordings in tables with the columns of a trace CSV.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -16,7 +16,7 @@ use pyo3_arrow::PyTable;
 use crate::about::About;
 use crate::error::{Place, Stopped, heed, of_library, raise};
 
-/// A recording as the library takes it. NaN stands for what is missing.
+/// A recording in the form that the library takes. Missing values are NaN.
 #[derive(Debug)]
 pub struct Recording {
     /// Name in messages.
@@ -25,13 +25,13 @@ pub struct Recording {
     pub time_s: Vec<f64>,
     /// Readings.
     pub readings: Vec<f64>,
-    /// Data of a converter's codes: deviation, Ω, and true if it stood at an end of its scale.
+    /// Per converter code: its deviation, Ω, and true if it was at an end of the scale.
     converter: Option<Vec<(f64, bool)>>,
     /// Unit of the readings.
     pub unit: ReadingUnit,
-    /// The reference and what it measures.
+    /// Quantity and values of the reference.
     pub reference: Option<(Quantity, Vec<f64>)>,
-    /// The joint that the sensor sits on.
+    /// The joint that the sensor is mounted on.
     pub joint: Option<JointParams>,
     /// True if the user has given the unit of the strains.
     knows_strain_unit: bool,
@@ -39,16 +39,16 @@ pub struct Recording {
     knows_resistance_unit: bool,
 }
 
-/// Rows after which an interrupt is heeded.
+/// Number of rows between checks for an interrupt.
 const HEEDED: usize = 4096;
 
-/// Exactly one of each of the first two groups, at most one of the third.
+/// Groups of columns: a table has exactly one of each of the first two groups, and at most one of the third.
 const TIMES: [&str; 2] = ["time_s", "time_us"];
 const READINGS: [&str; 3] = ["resistance_ohm", "resistance_ratio", "adc"];
 const REFERENCES: [&str; 3] = ["strain", "displacement_mm", "angle_deg"];
 
 impl Recording {
-    /// Takes a table apart.
+    /// Extracts a recording from a table.
     pub fn new(table: PyTable, about: About) -> PyResult<Self> {
         let (batches, schema) = table.into_inner();
         let about = about.completed(&schema)?;
@@ -95,24 +95,24 @@ impl Recording {
         })
     }
 
-    /// Its name before a message.
+    /// Returns its name as the beginning of a message.
     pub fn before(&self) -> String {
         self.name.as_deref().map_or_else(String::new, |name| format!("{name}: "))
     }
 
-    /// First and last time, s.
+    /// Returns the first and the last time, s.
     pub fn times(&self) -> (f64, f64) {
         let ends = (self.time_s.first(), self.time_s.last());
         (ends.0.copied().unwrap_or(f64::NAN), ends.1.copied().unwrap_or(f64::NAN))
     }
 
-    /// Rows from the first one up to one.
+    /// Returns the first `rows` rows.
     pub fn until(&self, rows: usize) -> (&[f64], &[f64], Option<&[f64]>) {
         let reference = self.reference.as_ref().map(|(_, values)| &values[..rows]);
         (&self.time_s[..rows], &self.readings[..rows], reference)
     }
 
-    /// Rows of it as the library calibrates on them.
+    /// Returns samples of it in the form that the library calibrates on.
     pub fn known<'a>(&self, samples: &Samples<'a>) -> Result<ohmstrain::Recording<'a>, Error> {
         let mut one = ohmstrain::Recording::new(samples.time_s(), samples.reading(), samples.strain())?;
         if self.unit == ReadingUnit::Ratio {
@@ -130,7 +130,7 @@ impl Recording {
         Ok(self.joint.map_or(one, |joint| one.on_joint(joint)))
     }
 
-    /// Time, s, and reading of a row.
+    /// Returns time, s, and reading of a row.
     pub fn row(&self, row: usize) -> (f64, Reading) {
         let (sd, saturated) = self.converter.as_ref().map_or((0.0, false), |converter| converter[row]);
         (self.time_s[row], Reading { value: self.readings[row], sd, saturated })
@@ -152,7 +152,7 @@ impl Recording {
         Ok(())
     }
 
-    /// Smooths the rows, in segments from the last to the first; an interrupt on its way back stops it.
+    /// Smooths the rows in segments, from the last to the first; an interrupt stops the backward pass.
     pub fn smoothed(&self, builder: FilterBuilder, mut take: impl FnMut(Range<usize>, &[Estimate])) -> PyResult<()> {
         let done = builder.smooth_backward(
             self.time_s.len(),
@@ -168,7 +168,7 @@ impl Recording {
         })
     }
 
-    /// Converts an error of the library on it.
+    /// Converts an error of the library about this recording.
     pub fn refused(&self, error: &Error) -> PyErr {
         of_library(error, self.name.as_deref())
     }
@@ -184,7 +184,7 @@ impl Recording {
     }
 }
 
-/// The one column of a group that a table has.
+/// Returns the only column of a group in a table.
 fn one_of(schema: &Schema, group: &[&'static str], file: Option<&str>) -> PyResult<Option<&'static str>> {
     let found: Vec<&'static str> =
         group.iter().copied().filter(|name| schema.fields().iter().any(|field| field.name() == name)).collect();
@@ -198,13 +198,13 @@ fn one_of(schema: &Schema, group: &[&'static str], file: Option<&str>) -> PyResu
     }
 }
 
-/// A column of numbers; NaN where there is none.
+/// Returns a column of numbers; NaN where there is none.
 fn numbers(batches: &[RecordBatch], schema: &Arc<Schema>, name: &str, file: Option<&str>) -> PyResult<Vec<f64>> {
     let place = || Place { file, column: Some(name), ..Place::default() };
     let wrong = |error: ArrowError| raise(&place(), &format!("expected numbers: {error}"));
     let index = schema.index_of(name).map_err(wrong)?;
     let kind = schema.field(index).data_type();
-    // A column of nulls alone has no other kind.
+    // A column of nulls alone has no other type.
     if !kind.is_numeric() && !kind.is_null() {
         return Err(raise(&place(), &format!("expected numbers, found {kind}")));
     }

@@ -22,7 +22,7 @@ pub struct Sensor {
 }
 
 impl Sensor {
-    /// Returns the sensor on the joint of a recording, if it has one; with its readings checked.
+    /// Returns the sensor on the joint of a recording, if it has one, after a check of the readings.
     fn for_recording(&self, recording: &Recording, options: &Options) -> PyResult<Cow<'_, ohmstrain::Sensor>> {
         recording.check_unit(&self.sensor, options.rest_resistance(&self.sensor)?)?;
         self.on_joint(recording.joint, recording.name.as_deref())
@@ -58,7 +58,7 @@ impl Sensor {
         Some(Closing { file, params, findings, tested: None, calibration_s: None, more: "findings" }.lines())
     }
 
-    /// All numbers as JSON.
+    /// Returns all numbers as JSON.
     fn json(&self) -> PyResult<String> {
         serde_json::to_string(self.sensor.params()).map_err(|error| raise(&Place::default(), &error.to_string()))
     }
@@ -84,13 +84,13 @@ impl Sensor {
         EstimatorKind::name(self.sensor.params().default_estimator)
     }
 
-    /// Names of the columns of its estimates, of a recording with a joint if there is one.
+    /// Returns the names of the columns of its estimates, for a recording on a joint if there is one.
     fn columns(&self, about: About, options: Options) -> PyResult<Vec<&'static str>> {
         let sensor = self.on_joint(about.joint()?, None)?;
         Ok(options.columns(&sensor)?.iter().map(ohmstrain::Column::name).collect())
     }
 
-    /// Creates a filter for readings as they come, on a joint if there is one.
+    /// Creates a filter for live readings, on a joint if there is one.
     #[pyo3(signature = (options, about=About::default()))]
     fn live(&self, options: Options, about: About) -> PyResult<LiveFilter> {
         let sensor = self.on_joint(about.joint()?, None)?;
@@ -104,7 +104,7 @@ impl Sensor {
         Ok(LaggedFilter::new(filter, options.columns(&self.sensor)?))
     }
 
-    /// A filter that goes on from a state.
+    /// Resumes a filter from a state.
     #[pyo3(signature = (options, state, file=None))]
     fn resume(&self, options: Options, state: &str, file: Option<&str>) -> PyResult<LiveFilter> {
         let stored = stored(state, file)?;

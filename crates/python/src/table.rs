@@ -10,24 +10,24 @@ use pyo3_arrow::PyRecordBatch;
 
 use crate::error::{Place, raise};
 
-/// Estimates, column by column, while they are made: cells that are not known are null.
+/// Estimates under construction, column by column; unknown cells are null.
 #[derive(Debug)]
 pub struct Estimates {
     columns: Vec<Column>,
-    /// NaN where nothing is known; empty for flags.
+    /// NaN for unknown values; empty for flags.
     numbers: Vec<Vec<f64>>,
     flags: Vec<ohmstrain::Flags>,
 }
 
 impl Estimates {
-    /// Room for so many rows.
+    /// Allocates estimates for this number of rows.
     pub fn new(columns: Vec<Column>, rows: usize) -> Self {
         let room = |column: &Column| if column.is_flags() { vec![] } else { vec![f64::NAN; rows] };
         let numbers = columns.iter().map(room).collect();
         Self { columns, numbers, flags: vec![ohmstrain::Flags::NONE; rows] }
     }
 
-    /// Puts rows from `first` on.
+    /// Stores rows from `first` on.
     pub fn put(&mut self, first: usize, rows: &[Estimate]) {
         for (column, numbers) in self.columns.iter().zip(&mut self.numbers) {
             if let Some(cells) = numbers.get_mut(first..first + rows.len()) {
@@ -39,7 +39,7 @@ impl Estimates {
         }
     }
 
-    /// Converts it to a table. Arrow's Python makes one faster in this form than in pieces.
+    /// Converts it to a table of one batch, which Arrow's Python handles faster than several.
     pub fn into_batch(self) -> PyResult<PyRecordBatch> {
         let failed = |error: ArrowError| raise(&Place::default(), &error.to_string());
         let (mut fields, mut arrays): (Vec<Field>, Vec<ArrayRef>) = (Vec::new(), Vec::new());
@@ -53,7 +53,7 @@ impl Estimates {
 }
 
 fn nullable(numbers: Vec<f64>) -> ArrayRef {
-    // Mostly all are known.
+    // Mostly all values are known.
     let unknown = numbers.iter().fold(false, |unknown, number| unknown | number.is_nan());
     let known = unknown.then(|| BooleanBuffer::collect_bool(numbers.len(), |row| !numbers[row].is_nan()));
     Arc::new(Float64Array::new(numbers.into(), known.map(NullBuffer::new)))
@@ -62,7 +62,7 @@ fn nullable(numbers: Vec<f64>) -> ArrayRef {
 fn texts(flags: &[ohmstrain::Flags]) -> ArrayRef {
     let mut texts = StringBuilder::with_capacity(flags.len(), flags.len());
     for flags in flags {
-        // Mostly there is nothing to say.
+        // Mostly there are no flags.
         if *flags == ohmstrain::Flags::NONE { texts.append_value("") } else { texts.append_value(flags.to_string()) }
     }
     Arc::new(texts.finish())

@@ -3,7 +3,7 @@ use pyo3_arrow::PyRecordBatch;
 
 use crate::recording::Recording;
 
-/// Estimates and what casts doubt on them.
+/// Estimates, and the warnings about them.
 pub type Doubtful = (PyRecordBatch, Vec<String>);
 
 /// Watch for use outside the calibrated range.
@@ -21,7 +21,7 @@ impl Watch {
         Self { watch, quiet: QuietWatch::new(sensor, rest_resistance, known), warnings: Vec::new() }
     }
 
-    /// Puts what has been seen into a state.
+    /// Stores the state of the watches.
     pub fn store(&self, stored: &mut Stored) {
         (stored.validity, stored.quiet) = (Some(self.watch.seen()), Some(self.quiet.seen()));
     }
@@ -39,7 +39,7 @@ impl Watch {
         self.warnings.extend(seen.map(|warning| format!("{}{warning}", recording.before())));
     }
 
-    /// Takes a filter's estimate of a row, and asks if a long hold was a rest.
+    /// Takes a filter's estimate of a row, and asks whether a long hold was a rest.
     pub fn see_rest(&mut self, recording: &Recording, estimate: &Estimate) {
         let quiet = self.quiet.see(estimate);
         self.warnings.extend(quiet.map(|quiet| format!("{}{}", recording.before(), quiet.text(Interface::Python))));

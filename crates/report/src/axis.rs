@@ -1,7 +1,7 @@
 //! Axes of a plot: a range that holds the data, round ticks, linear or logarithmic.
 //!
-//! The ticks are ours and not the plotting library's because its own tick search asserts and compares with an absolute
-//! epsilon: a NaN, or a range like 1e-20, must end neither in a panic nor in an endless loop.
+//! The ticks are our own, since the plotting library's tick search asserts and compares with an absolute epsilon: a NaN, or a
+//! range such as 1e-20, must not cause a panic or an endless loop.
 
 use std::ops::Range;
 
@@ -11,7 +11,7 @@ use ohmstrain::number;
 
 /// Largest magnitude on an axis: the difference of two such numbers is still finite.
 const LARGEST: f64 = 1e300;
-/// Shortest range, relative to the numbers in it; below it neighbouring ticks would look the same.
+/// Shortest range relative to its numbers; neighbouring ticks of a shorter one would look the same.
 const SHORTEST: f64 = 1e-9;
 /// Space left free at both ends, as a share of the range.
 const MARGIN: f64 = 0.04;
@@ -31,14 +31,14 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// A linear axis that holds all finite `values`, with a margin.
+    /// Creates a linear axis that holds all finite `values`, with a margin.
     pub fn holding(label: &str, values: impl IntoIterator<Item = f64>, most_ticks: usize) -> Self {
         let (low, high) = opened(extent(values));
         let margin = MARGIN * (high - low);
         Self::linear(label, low - margin, high + margin, most_ticks)
     }
 
-    /// A linear axis that holds all of `core`, and of `rest` what does not make it more than twice as long.
+    /// Creates a linear axis that holds all of `core`, and as much of `rest` as makes it at most twice as long.
     pub fn around(
         label: &str,
         core: impl IntoIterator<Item = f64>,
@@ -51,7 +51,7 @@ impl Axis {
         Self::holding(label, within.chain([low, high]), most_ticks)
     }
 
-    /// A linear axis from `low` to `high`.
+    /// Creates a linear axis from `low` to `high`.
     pub fn linear(label: &str, low: f64, high: f64, most_ticks: usize) -> Self {
         let (low, high) = opened(Some((low, high)));
         let step = round_step((high - low) / most_ticks.max(1) as f64);
@@ -60,7 +60,7 @@ impl Axis {
         Self { label: label.into(), low, high, log: false, ticks, step }
     }
 
-    /// A logarithmic axis from `low` to `high`, both positive.
+    /// Creates a logarithmic axis from `low` to `high`, both positive.
     pub fn logarithmic(label: &str, low: f64, high: f64) -> Self {
         let low = if low > 1.0 / LARGEST { low.min(LARGEST / 10.0) } else { 1e-3 };
         let high = if high > 1.2 * low { high.min(LARGEST) } else { 10.0 * low };
@@ -84,17 +84,17 @@ impl Axis {
         share.clamp(0.0, 1.0)
     }
 
-    /// The value at a place, 0 at the lower and 1 at the upper end.
+    /// Returns the value at a position, 0 at the lower and 1 at the upper end.
     pub fn value(&self, share: f64) -> f64 {
         if self.log { self.low * (self.high / self.low).powf(share) } else { self.low + share * (self.high - self.low) }
     }
 
-    /// Ends, and `log` if it is logarithmic.
+    /// Formats both ends, and `log` if the axis is logarithmic.
     pub fn as_attribute(&self) -> String {
         format!("{} {}{}", self.low, self.high, if self.log { " log" } else { "" })
     }
 
-    /// Ends of the axis.
+    /// Returns the ends of the axis.
     pub fn ends(&self) -> (f64, f64) {
         (self.low, self.high)
     }
@@ -112,7 +112,7 @@ impl Axis {
     }
 }
 
-/// Smallest and largest finite value.
+/// Returns the smallest and the largest finite value.
 pub fn extent(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
     values
         .into_iter()
@@ -120,7 +120,7 @@ pub fn extent(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
         .fold(None, |range, x| Some(range.map_or((x, x), |(low, high): (f64, f64)| (low.min(x), high.max(x)))))
 }
 
-/// A range with a length: 0 to 1 if nothing is known, a bit to both sides if there is one value only.
+/// Returns a range of positive length: 0 to 1 if nothing is known, a little to both sides of a single value.
 fn opened(range: Option<(f64, f64)>) -> (f64, f64) {
     let Some((low, high)) = range else { return (0.0, 1.0) };
     if !(low.is_finite() && high.is_finite()) {
@@ -135,7 +135,7 @@ fn opened(range: Option<(f64, f64)>) -> (f64, f64) {
     (low - half, high + half)
 }
 
-/// The smallest round number that is at least `step`.
+/// Returns the smallest round number that is at least `step`.
 fn round_step(step: f64) -> f64 {
     let decade = 10.0_f64.powi(number::exponent(step));
     STEPS.iter().map(|digit| digit * decade).find(|round| *round >= step * 0.999_999).unwrap_or(10.0 * decade)

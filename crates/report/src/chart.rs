@@ -1,4 +1,4 @@
-//! One plot: axes, and layers that are drawn in the order in which they were added.
+//! One plot: axes, and layers that are drawn in the order of their addition.
 
 mod draw;
 mod paper;
@@ -9,11 +9,11 @@ use super::axis::Axis;
 use super::ink::{Ink, Key};
 use super::thin::{self, Point};
 
-/// Drawing units per pixel of the page: the plotting library knows whole units only, and lines need a finer grid.
+/// Drawing units per pixel of the page: the plotting library uses integer units, and lines need a finer grid.
 pub const UNITS_PER_PX: u32 = 4;
 /// Size of the text, px.
 const TEXT_PX: f64 = 13.0;
-/// Space around the plot, px; at the left and below for labels.
+/// Space around the plot, px; on the left and below for labels.
 const LEFT_PX: f64 = 74.0;
 const BELOW_PX: f64 = 46.0;
 const ABOVE_PX: f64 = 10.0;
@@ -26,7 +26,7 @@ pub const HIGH: (f64, f64) = (WIDE.0, 440.0);
 /// Size of a plot that shares its line with another one, px.
 pub const HALF: (f64, f64) = (460.0, 320.0);
 
-/// Side of the cells in which one dot stands for all, px.
+/// Side of the cells in which one dot represents all, px.
 const DOT_CELL_PX: f64 = 3.0;
 /// Size of an arrow's head, px.
 const ARROW_PX: (f64, f64) = (9.0, 3.5);
@@ -48,7 +48,7 @@ struct Layer {
     shape: Shape,
 }
 
-/// Shape of a layer, in shares of the plot's width and height.
+/// Shape of a layer, in fractions of the plot's width and height.
 #[derive(Debug)]
 enum Shape {
     Lines(Vec<Vec<Point>>),
@@ -58,7 +58,7 @@ enum Shape {
 }
 
 impl Chart {
-    /// An empty plot.
+    /// Creates an empty plot.
     pub fn new(size_px: (f64, f64), x: Axis, y: Axis) -> Self {
         Self { size_px, x, y, layers: vec![], legend: vec![] }
     }
@@ -68,14 +68,14 @@ impl Chart {
         self.legend.clone()
     }
 
-    /// A line through points; one that is not finite breaks it. An empty `name` keeps it out of the legend.
+    /// Adds a line through points, broken at points that are not finite. An empty `name` keeps it out of the legend.
     pub fn line(&mut self, ink: Ink, name: &str, points: impl IntoIterator<Item = Point>) {
         let columns = self.columns();
         let pieces = thin::line(points.into_iter().map(|(x, y)| (self.x.unit(x), self.y.unit(y))), columns);
         self.add(ink, name, Shape::Lines(pieces));
     }
 
-    /// A line through points, broken where it leaves the plot: for what is computed and not measured.
+    /// Adds a line through points, broken where it leaves the plot; used for computed curves.
     pub fn curve(&mut self, ink: Ink, name: &str, points: impl IntoIterator<Item = Point>) {
         let ((left, right), (low, high)) = (self.x.ends(), self.y.ends());
         let inside = |(x, y): Point| {
@@ -85,7 +85,7 @@ impl Chart {
         self.line(ink, name, points.into_iter().map(inside));
     }
 
-    /// The area between two lines, from `(x, lower, upper)`.
+    /// Adds the area between two lines, from `(x, lower, upper)`.
     pub fn band(&mut self, ink: Ink, name: &str, points: impl IntoIterator<Item = (f64, f64, f64)>) {
         let columns = self.columns();
         let unit = |(x, lower, upper)| (self.x.unit(x), self.y.unit(lower), self.y.unit(upper));
@@ -93,7 +93,7 @@ impl Chart {
         self.add(ink, name, Shape::Areas(outlines));
     }
 
-    /// A line that crosses itself, from `(x, y, place of its ink)`.
+    /// Adds a line that crosses itself, from `(x, y, index of its ink)`.
     pub fn loops(&mut self, inks: &[(Ink, &str)], points: impl IntoIterator<Item = (f64, f64, usize)>) {
         let unit: Vec<_> = points.into_iter().map(|(x, y, ink)| (self.x.unit(x), self.y.unit(y), ink)).collect();
         let pieces = thin::loops(&unit);
@@ -103,7 +103,7 @@ impl Chart {
         }
     }
 
-    /// Adds single points, one for all that would look the same.
+    /// Adds single points, one for each group of points that would look the same.
     pub fn dots(&mut self, ink: Ink, name: &str, points: impl IntoIterator<Item = Point>) {
         let (width, height) = self.area_px();
         let mut visited = HashSet::new();
@@ -115,7 +115,7 @@ impl Chart {
         self.add(ink, name, Shape::Dots(dots));
     }
 
-    /// Heads of arrows, each at its second point, coming from the first one.
+    /// Adds arrowheads, each at the second point of a step.
     pub fn arrows(&mut self, ink: Ink, name: &str, steps: impl IntoIterator<Item = (Point, Point)>) {
         let (width, height) = self.area_px();
         let head = |((x0, y0), (x1, y1)): (Point, Point)| {
@@ -134,7 +134,7 @@ impl Chart {
         self.add(ink, name, Shape::Areas(heads));
     }
 
-    /// A part of the x axis.
+    /// Shades a part of the x axis.
     pub fn shade(&mut self, ink: Ink, name: &str, from: f64, until: f64) {
         let (from, until) = (self.x.unit(from), self.x.unit(until));
         if until > from {
@@ -142,7 +142,7 @@ impl Chart {
         }
     }
 
-    /// A line across the plot at `x`, unless it lies outside.
+    /// Adds a vertical line at `x`, unless it lies outside.
     pub fn vertical(&mut self, ink: Ink, name: &str, x: f64) {
         let (low, high) = self.x.ends();
         if (low..=high).contains(&x) {
@@ -151,7 +151,7 @@ impl Chart {
         }
     }
 
-    /// A line across the plot at `y`, unless it lies outside.
+    /// Adds a horizontal line at `y`, unless it lies outside.
     pub fn horizontal(&mut self, ink: Ink, name: &str, y: f64) {
         let (low, high) = self.y.ends();
         if (low..=high).contains(&y) {
@@ -160,7 +160,7 @@ impl Chart {
         }
     }
 
-    /// Bars that stand on zero, from `(left, right, height)`.
+    /// Adds bars that stand on zero, from `(left, right, height)`.
     pub fn bars(&mut self, ink: Ink, name: &str, bars: impl IntoIterator<Item = (f64, f64, f64)>) {
         let ground = self.y.unit(0.0);
         let unit = |(left, right, height)| {
@@ -187,12 +187,12 @@ impl Chart {
         self.layers.push(Layer { ink, name: name.into(), shape });
     }
 
-    /// Size of the plot without its labels, px.
+    /// Returns the size of the plot without its labels, px.
     fn area_px(&self) -> (f64, f64) {
         ((self.size_px.0 - LEFT_PX - RIGHT_PX).max(1.0), (self.size_px.1 - ABOVE_PX - BELOW_PX).max(1.0))
     }
 
-    /// One column per pixel of the page.
+    /// Returns the number of columns, one per pixel of the page.
     fn columns(&self) -> usize {
         self.area_px().0 as usize
     }
@@ -221,7 +221,7 @@ impl Chart {
     }
 }
 
-/// Rounds to more digits than a drawing shows.
+/// Rounds to more digits than a drawing can show.
 fn rounded(value: f64) -> f64 {
     format!("{value:.6e}").parse().unwrap_or(value)
 }

@@ -9,7 +9,7 @@ use super::innovations::{BOUND, Innovations};
 use super::recording::PlottedRecording;
 use ohmstrain::number::plain;
 
-/// |z| against time.
+/// Draws |z| against time.
 pub fn size(recording: &PlottedRecording, innovations: &Innovations) -> Result<Figure, ReportError> {
     let top = 1.2 * innovations.usual_largest().max(1.25 * BOUND);
     let y = Axis::linear("|z| = √NIS", 0.0, top, HIGH_TICKS);
@@ -31,7 +31,7 @@ pub fn size(recording: &PlottedRecording, innovations: &Innovations) -> Result<F
     Figure::new(chart, "Normalised innovations", &note, false)
 }
 
-/// Histogram of |z| beside its density.
+/// Draws the histogram of |z| with its expected density.
 pub fn histogram(innovations: &Innovations) -> Result<Figure, ReportError> {
     let bins = innovations.histogram();
     let end = Innovations::histogram_end();
@@ -46,7 +46,7 @@ pub fn histogram(innovations: &Innovations) -> Result<Figure, ReportError> {
     Figure::new(chart, "Distribution of |z|", note, true)
 }
 
-/// Autocorrelation of |z|.
+/// Draws the autocorrelation of |z|.
 pub fn autocorrelation(innovations: &Innovations) -> Result<Figure, ReportError> {
     let values = innovations.autocorrelation();
     let bound = innovations.autocorrelation_bound();

@@ -1,4 +1,4 @@
-//! The plots of what is left: of the strain, and of the readings.
+//! Plots of the errors of strain and of readings.
 
 use ohmstrain::Estimate;
 
@@ -12,7 +12,7 @@ use super::recording::{PlottedRecording, Z_95};
 /// Height of these plots, px.
 const HEIGHT_PX: f64 = 240.0;
 
-/// Estimate less reference against time; nothing without a reference.
+/// Draws the estimate minus the reference against time; `None` without a reference.
 pub fn strain(recording: &PlottedRecording) -> Result<Option<Figure>, ReportError> {
     let Some(truth) = recording.truth else { return Ok(None) };
     let errors = |rows: &[Estimate]| -> Vec<f64> {
@@ -38,7 +38,7 @@ pub fn strain(recording: &PlottedRecording) -> Result<Option<Figure>, ReportErro
     Figure::new(chart, "Error against time", note, false).map(Some)
 }
 
-/// Recorded readings less the law driven by the reference; nothing without a reference.
+/// Draws the recorded readings minus those of the law driven by the reference; `None` without a reference.
 pub fn reading(recording: &PlottedRecording) -> Result<Option<Figure>, ReportError> {
     let Some(driven) = &recording.driven else { return Ok(None) };
     let residual: Vec<f64> =

@@ -11,7 +11,7 @@ use super::ink::{Ink, Key};
 use super::recording::PlottedRecording;
 use super::{ReportError, Scored, slug};
 
-/// A plot with what belongs to it.
+/// A plot with its heading, legend and note.
 #[derive(Debug, Serialize)]
 pub struct Figure {
     /// Heading.
@@ -22,7 +22,7 @@ pub struct Figure {
     pub legend: Vec<Key>,
     /// Note on how to read it.
     pub note: String,
-    /// Shares its line with the next one.
+    /// True if it shares its line with the next one.
     pub half: bool,
     /// Name of its files without their ending: the same for every recording, so that a paper can include them.
     #[serde(skip)]
@@ -41,18 +41,18 @@ impl Figure {
     }
 }
 
-/// Ticks on an axis.
+/// Largest number of ticks on an axis.
 pub const WIDE_TICKS: usize = 10;
 pub const HALF_TICKS: usize = 6;
 pub const HIGH_TICKS: usize = 6;
 
-/// A time axis over the whole recording.
+/// Returns a time axis over the whole recording.
 pub fn time_axis(recording: &PlottedRecording) -> Axis {
     let (first, last) = extent(recording.time_s.iter().copied()).unwrap_or((0.0, 1.0));
     Axis::linear("Time, s", first, last, WIDE_TICKS)
 }
 
-/// Marks the part that is scored.
+/// Marks the scored part.
 pub fn mark_test(chart: &mut Chart, recording: &PlottedRecording) {
     if recording.scored == Scored::default() {
         return;
@@ -62,12 +62,12 @@ pub fn mark_test(chart: &mut Chart, recording: &PlottedRecording) {
     chart.shade(Ink::TEST, "scored part", from_s.unwrap_or(first), until_s.unwrap_or(last));
 }
 
-/// Values with their times.
+/// Pairs values with their times.
 pub fn against_time<'a>(recording: &PlottedRecording<'a>, values: impl Iterator<Item = f64> + 'a) -> Vec<(f64, f64)> {
     recording.time_s.iter().copied().zip(values).collect()
 }
 
-/// Recorded readings, the filter's fit, and the law with its band.
+/// Draws the recorded readings, the filter's fit, and the law with its band.
 pub fn reading(recording: &PlottedRecording) -> Result<Figure, ReportError> {
     let fitted: Vec<f64> = recording.filtered.iter().map(|row| recording.law.fitted(row)).collect();
     let (centre, sd) = match &recording.driven {
@@ -97,7 +97,7 @@ pub fn reading(recording: &PlottedRecording) -> Result<Figure, ReportError> {
     Figure::new(chart, "Readings and fit", note, false)
 }
 
-/// Reference, filter with band, smoother.
+/// Draws the reference, the filter with its band, and the smoother.
 pub fn strain(recording: &PlottedRecording) -> Result<Figure, ReportError> {
     let mut chart = strain_chart(recording, 0..recording.time_s.len(), WIDE);
     mark_test(&mut chart, recording);
@@ -112,7 +112,7 @@ pub fn strain(recording: &PlottedRecording) -> Result<Figure, ReportError> {
     Figure::new(chart, &format!("{} against time", recording.quantity_name()), note, false)
 }
 
-/// An empty plot for the strain of some rows, on the scale of all of them.
+/// Creates an empty plot for the strain of some rows, on the scale of all rows.
 pub fn strain_chart(recording: &PlottedRecording, rows: Range<usize>, size_px: (f64, f64)) -> Chart {
     let mean = |row: &Estimate| recording.shown(row.strain);
     let (filtered, smoothed) = (recording.filtered.iter(), recording.smoothed.iter());
@@ -126,7 +126,7 @@ pub fn strain_chart(recording: &PlottedRecording, rows: Range<usize>, size_px: (
     Chart::new(size_px, Axis::linear("Time, s", first, last, WIDE_TICKS), y)
 }
 
-/// The strain of some rows.
+/// Draws the strain of some rows.
 pub fn draw_strain(chart: &mut Chart, recording: &PlottedRecording, rows: Range<usize>) {
     let (skipped, count) = (rows.start, rows.len());
     let times = || recording.time_s.iter().copied().skip(skipped).take(count);

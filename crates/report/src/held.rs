@@ -1,4 +1,4 @@
-//! The plot of the longest holds.
+//! Plots of the longest holds.
 
 use super::ReportError;
 use super::axis::{Axis, extent};
@@ -12,7 +12,7 @@ use ohmstrain::number::plain;
 /// Share of a hold that is plotted.
 const LAST: f64 = 0.99;
 
-/// The longest holds on a logarithmic time axis, or nothing if there is none.
+/// Draws the longest holds on a logarithmic time axis; `None` without a hold.
 pub fn relaxation(recording: &PlottedRecording) -> Result<Option<Figure>, ReportError> {
     let held: Vec<(Curve, &Hold)> =
         recording.longest_holds().iter().filter_map(|hold| Some((Curve::new(recording, hold)?, hold))).collect();
@@ -36,7 +36,7 @@ pub fn relaxation(recording: &PlottedRecording) -> Result<Option<Figure>, Report
     Figure::new(chart, "Relaxation while held", note, false).map(Some)
 }
 
-/// Parts of a decade over which a rate is taken.
+/// Number of parts of a decade over each of which a rate is computed.
 const PER_DECADE: f64 = 8.0;
 
 /// Draws the rate of the readings in the longest holds; `None` if there is no hold.
@@ -59,7 +59,7 @@ pub fn rate(recording: &PlottedRecording) -> Result<Option<Figure>, ReportError>
     Figure::new(chart, "Rate of relaxation", note, false).map(Some)
 }
 
-/// Slopes of straight lines through parts of a decade, at the middle of their times.
+/// Returns the slopes of straight lines through parts of a decade, at the middle of their times.
 fn slopes(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let part = |time: f64| (time.log10() * PER_DECADE).floor();
     let known: Vec<(f64, f64)> = points.iter().copied().filter(|(time, y)| *time > 0.0 && y.is_finite()).collect();
@@ -74,7 +74,7 @@ fn slopes(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     known.chunk_by(|a, b| part(a.0) == part(b.0)).filter_map(of_part).collect()
 }
 
-/// Readings at the beginning and at the end of every hold, level by level; nothing where fewer than three levels are held.
+/// Draws the readings at the beginning and at the end of every hold, level by level; `None` for fewer than three levels.
 pub fn levels(recording: &PlottedRecording) -> Result<Option<Figure>, ReportError> {
     let ends: Vec<(f64, f64, f64)> = recording.holds().iter().filter_map(|hold| ends_of(recording, hold)).collect();
     let mut levels: Vec<f64> = ends.iter().map(|(strain, ..)| *strain).collect();
@@ -97,7 +97,7 @@ pub fn levels(recording: &PlottedRecording) -> Result<Option<Figure>, ReportErro
     Figure::new(chart, "Held levels", note, false).map(Some)
 }
 
-/// Strain of a hold, and its first and last readings.
+/// Returns the strain of a hold, and its first and last readings.
 fn ends_of(recording: &PlottedRecording, hold: &Hold) -> Option<(f64, f64, f64)> {
     let end_s = recording.time_s.get(hold.first)? + LAST * hold.duration_s;
     let rows = recording.time_s.iter().zip(recording.reading).take(hold.last + 1).skip(hold.first);
@@ -107,7 +107,7 @@ fn ends_of(recording: &PlottedRecording, hold: &Hold) -> Option<(f64, f64, f64)>
     Some((hold.strain, begun, known.next_back()?))
 }
 
-/// A hold's readings and the law's, relative to their first.
+/// Readings of a hold and of the law, relative to the first one.
 struct Curve {
     start_s: f64,
     recorded: Vec<(f64, f64)>,
@@ -117,7 +117,7 @@ struct Curve {
 impl Curve {
     fn new(recording: &PlottedRecording, hold: &Hold) -> Option<Self> {
         let start_s = *recording.time_s.get(hold.first)?;
-        // The next movement begins in the readings before the reference has left the hold's tolerance.
+        // The next movement begins before the reference leaves the hold's tolerance.
         let end_s = start_s + LAST * hold.duration_s;
         let rows = || {
             let rows = recording.time_s.iter().zip(recording.reading).take(hold.last + 1).skip(hold.first);

@@ -1,15 +1,15 @@
 //! Inks: one table for plots, legends and style sheet.
 //!
-//! The plotting library writes colours into the drawing. Each ink has a colour of its own there, by which the style
-//! sheet finds it and gives it the hue of the page's light or dark scheme, and its dashes. Hues follow Okabe and Ito's
-//! palette, which stays distinct for colour-blind readers; lines that could still be mixed up differ in their dashes.
+//! The plotting library writes colours into the drawing. The style sheet identifies each ink by its unique colour, and assigns
+//! its dashes and its hue in the page's light or dark scheme. Hues follow Okabe and Ito's palette, which stays distinct for
+//! colour-blind readers; lines that could still be confused differ in their dashes.
 
 use serde::Serialize;
 
-/// Style of one kind of thing in a drawing.
+/// Style of one kind of element in a drawing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ink {
-    /// Its mark in the drawing, and its colour where style sheets are ignored.
+    /// Colour that identifies it in the drawing; it is visible if style sheets are ignored.
     pub colour: (u8, u8, u8),
     /// Variable of the style sheet that holds its hue.
     pub hue: &'static str,
@@ -28,7 +28,7 @@ impl Ink {
     pub const TRUTH: Self = Self::line((0x1B, 0x1B, 0x1B), "ink", 1.6);
     /// Estimate of the filter.
     pub const FILTER: Self = Self::line((0x00, 0x72, 0xB2), "blue", 1.6);
-    /// The filter's line where another one runs on top of it.
+    /// The filter's line if another line runs on top of it.
     pub const FILTER_BELOW: Self = Self { opacity: 0.6, ..Self::line((0x00, 0x72, 0xB1), "blue", 4.5) };
     /// The filter's uncertainty.
     pub const FILTER_BAND: Self = Self { opacity: 0.25, ..Self::line((0x00, 0x72, 0xB3), "blue", 8.0) };
@@ -70,7 +70,7 @@ impl Ink {
     pub const BARS: Self = Self { opacity: 0.45, ..Self::line((0x00, 0x72, 0xB5), "blue", 8.0) };
     /// Single values.
     pub const DOTS: Self = Self { opacity: 0.55, ..Self::line((0x1C, 0x1C, 0x1C), "ink", 1.0) };
-    /// Recorded during the longest holds.
+    /// Readings recorded during the longest holds.
     pub const HOLDS: [Self; 4] = [
         Self::line((0x00, 0x72, 0xB6), "blue", 1.8),
         Self::line((0xD5, 0x5E, 0x02), "red", 1.8),
@@ -99,7 +99,7 @@ impl Ink {
         Self { colour, hue, dashes, width, opacity: 1.0 }
     }
 
-    /// All of them.
+    /// Returns all of them.
     pub fn all() -> Vec<Self> {
         let single = [
             Self::RECORDED,
@@ -126,14 +126,14 @@ impl Ink {
         single.into_iter().chain(Self::HOLDS).chain(Self::HELD_LAWS).chain(Self::TIMES).chain(Self::SPEEDS).collect()
     }
 
-    /// The colour as the drawing writes it.
+    /// Returns the colour as it is written in the drawing.
     pub fn hex(self) -> String {
         let (red, green, blue) = self.colour;
         format!("#{red:02X}{green:02X}{blue:02X}")
     }
 }
 
-/// An ink as the style sheet sees it.
+/// An ink as a row of the style sheet.
 #[derive(Debug, Serialize)]
 pub struct Style {
     hex: String,
@@ -142,13 +142,13 @@ pub struct Style {
     plot_dashes: String,
 }
 
-/// The dashes alone, for a drawing without the page's style sheet.
+/// Returns rules for the dashes alone, for a drawing without the page's style sheet.
 pub fn dashes(units_per_px: u32) -> String {
     let rule = |style: Style| format!("[stroke=\"{}\"]{{stroke-dasharray:{}}}", style.hex, style.plot_dashes);
     styles(units_per_px).into_iter().filter(|style| !style.plot_dashes.is_empty()).map(rule).collect()
 }
 
-/// The style sheet's rows. A plot has `units_per_px` drawing units per pixel, a legend has one.
+/// Returns the rows of the style sheet. A plot has `units_per_px` drawing units per pixel, a legend has one.
 pub fn styles(units_per_px: u32) -> Vec<Style> {
     let dashes = |ink: Ink, unit: u32| {
         let lengths: Vec<String> = ink.dashes.iter().map(|px| (px * unit).to_string()).collect();
@@ -169,14 +169,14 @@ pub struct Key {
     pub hex: String,
     pub opacity: f64,
     pub width: f64,
-    /// A dot, and no line.
+    /// True for a dot instead of a line.
     pub is_dot: bool,
     /// Name of the series.
     pub name: String,
 }
 
 impl Key {
-    /// The entry of an ink.
+    /// Creates the entry of an ink.
     pub fn new(ink: Ink, name: &str) -> Self {
         Self { hex: ink.hex(), opacity: ink.opacity, width: ink.width.max(1.5), is_dot: false, name: name.into() }
     }

@@ -1,8 +1,8 @@
-//! Test of the filter's innovations: as large as stated, and independent of one another.
+//! Test of the filter's innovations: their size against the stated one, and their independence.
 
 use ohmstrain::Estimate;
 
-/// Standardised innovations of a recording. Their signs are not known: `|z| = √NIS`.
+/// Standardised innovations of a recording, without their signs: `|z| = √NIS`.
 pub struct Innovations {
     /// |z|, row by row; NaN where the reading was missing.
     pub size: Vec<f64>,
@@ -10,18 +10,18 @@ pub struct Innovations {
     pub count: usize,
     /// Mean of z²; 1 if the filter's covariance is right.
     pub mean_square: f64,
-    /// Share of |z| beyond [`BOUND`].
+    /// Share of rows with |z| beyond [`BOUND`].
     pub share_beyond: f64,
 }
 
-/// 95 % of a standard normal lie within ± this; its square is the 95 % point of χ² with one degree of freedom.
+/// Bound within ± of which 95 % of a standard normal lie; its square is the 95 % point of χ² with one degree of freedom.
 pub const BOUND: f64 = 1.959_964;
-/// Lags of the autocorrelation.
+/// Number of lags of the autocorrelation.
 const LAGS: usize = 40;
 /// Width and number of the histogram's bins.
 const BIN: f64 = 0.2;
 const BINS: usize = 20;
-/// Blocks of the moving mean over a recording.
+/// Number of blocks of the moving mean over a recording.
 const SHOWN_BLOCKS: usize = 60;
 
 impl Innovations {
@@ -44,7 +44,7 @@ impl Innovations {
         ((1.0 - half).max(0.0), 1.0 + half)
     }
 
-    /// The size that 99.8 % of them do not exceed.
+    /// Returns the 99.8 % quantile of |z|.
     pub fn usual_largest(&self) -> f64 {
         let mut known: Vec<f64> = self.size.iter().copied().filter(|z| z.is_finite()).collect();
         let place = (0.998 * known.len() as f64) as usize;
@@ -54,7 +54,7 @@ impl Innovations {
         *known.select_nth_unstable_by(place, f64::total_cmp).1
     }
 
-    /// Root mean square of |z| over successive blocks: `(first row, last row, value)`.
+    /// Returns the root mean square of |z| over successive blocks: `(first row, last row, value)`.
     pub fn moving_rms(&self) -> Vec<(usize, usize, f64)> {
         let length = self.size.len().div_ceil(SHOWN_BLOCKS).max(1);
         let rms = |block: &[f64]| {
@@ -65,7 +65,7 @@ impl Innovations {
         blocks.map(|(i, block)| (i * length, i * length + block.len() - 1, rms(block))).collect()
     }
 
-    /// Density of |z| in bins `(left, right, density)`; the last bin takes all that is larger.
+    /// Returns the density of |z| in bins `(left, right, density)`; the last bin contains all larger values.
     pub fn histogram(&self) -> Vec<(f64, f64, f64)> {
         let mut counts = [0_usize; BINS];
         for z in self.size.iter().filter(|z| z.is_finite()) {
@@ -84,12 +84,12 @@ impl Innovations {
         (2.0 / std::f64::consts::PI).sqrt() * (-0.5 * z * z).exp()
     }
 
-    /// Right end of the histogram.
+    /// Returns the right end of the histogram.
     pub const fn histogram_end() -> f64 {
         BIN * BINS as f64
     }
 
-    /// Autocorrelation of |z| at lags 1, 2, … in rows, missing ones left out.
+    /// Returns the autocorrelation of |z| at lags 1, 2, … in rows, without missing ones.
     pub fn autocorrelation(&self) -> Vec<(usize, f64)> {
         let mean = self.size.iter().filter(|z| z.is_finite()).sum::<f64>() / self.count.max(1) as f64;
         let off: Vec<f64> = self.size.iter().map(|z| if z.is_finite() { z - mean } else { 0.0 }).collect();
@@ -101,7 +101,7 @@ impl Innovations {
         (1..=LAGS.min(self.count / 4)).map(|lag| (lag, at(lag))).collect()
     }
 
-    /// 95 % of the autocorrelations of independent innovations lie within ± this.
+    /// Returns the bound within ± of which 95 % of the autocorrelations of independent innovations lie.
     pub fn autocorrelation_bound(&self) -> f64 {
         BOUND / (self.count.max(1) as f64).sqrt()
     }

@@ -15,16 +15,16 @@ pub struct Law<'a> {
     rest_reading: f64,
 }
 
-/// The law's answer to a known strain.
+/// Response of the law to a known strain.
 pub struct Driven {
     /// Readings, row by row; NaN where the strain is missing.
     pub reading: Vec<f64>,
-    /// Memory of the law, its branches, at the rows that were asked for.
+    /// State of the law's branches at the requested rows.
     pub memories: BTreeMap<usize, Vec<f64>>,
 }
 
 impl<'a> Law<'a> {
-    /// The law of a sensor whose reading at rest is `rest_reading`.
+    /// Creates the law of a sensor whose reading at rest is `rest_reading`.
     pub fn new(params: &'a SensorParams, rest_reading: f64) -> Self {
         let law = &params.law;
         let quasi_static = SensorLaw {
@@ -38,29 +38,30 @@ impl<'a> Law<'a> {
         Self { quasi_static, branches: &law.branches, estimator, rest_reading }
     }
 
-    /// g(ε).
+    /// Returns g(ε).
     pub fn gauge(&self, strain: f64) -> f64 {
         self.quasi_static.gauge_value_and_slope(strain).0
     }
 
-    /// dg/dε, the local gauge factor.
+    /// Returns dg/dε, the local gauge factor.
     pub fn gauge_slope(&self, strain: f64) -> f64 {
         self.quasi_static.gauge_value_and_slope(strain).1
     }
 
-    /// Strain beyond which one reading belongs to two strains.
+    /// Returns the strain beyond which a reading belongs to two strains.
     pub fn static_border(&self) -> Option<f64> {
         self.quasi_static.static_border()
     }
 
-    /// The reading that an estimate stands for.
+    /// Returns the reading that the law predicts for an estimate.
     pub fn fitted(&self, row: &Estimate) -> f64 {
         let (rising, falling) = split(row.strain_rate, row.strain_rate_sd);
         let dash_pot = self.quasi_static.extend_viscosity_s * rising + self.quasi_static.retract_viscosity_s * falling;
         self.reading(self.gauge(row.strain) + dash_pot + row.relaxation + row.baseline)
     }
 
-    /// Standard deviation of a reading around the law driven by the true strain: branches, baseline and white noise.
+    /// Returns the standard deviation of a reading around the law driven by the true strain: branches, baseline and white
+    /// noise.
     pub fn model_error(&self) -> f64 {
         self.estimator.map_or(f64::NAN, |estimator| {
             let noise = &estimator.noise;
@@ -69,13 +70,13 @@ impl<'a> Law<'a> {
         })
     }
 
-    /// Standard deviation of a reading's white noise.
+    /// Returns the standard deviation of a reading's white noise.
     pub fn reading_noise(&self) -> f64 {
         self.estimator.map_or(f64::NAN, |estimator| self.rest_reading.abs() * estimator.noise.reading_sd)
     }
 
-    /// The law driven by a known strain from rest, exactly for strain that moves linearly from row to row. Rows without
-    /// strain are stepped over. `remember` are the rows at which branches are wanted.
+    /// Drives the law from rest by a known strain; it is exact if the strain is linear from row to row. Rows without strain are
+    /// skipped. The branches are returned at the rows `remember`.
     pub fn driven(&self, time_s: &[f64], strain: &[f64], remember: &[usize]) -> Driven {
         let known: Vec<(usize, f64, f64)> = time_s
             .iter()
@@ -105,7 +106,7 @@ impl<'a> Law<'a> {
         driven
     }
 
-    /// Branches after `dt_s` seconds in which the strain goes from `from` to `to`.
+    /// Propagates the branches over `dt_s` seconds in which the strain goes linearly from `from` to `to`.
     fn drive(&self, state: &mut [f64], dt_s: f64, from: f64, to: f64) {
         if !(dt_s > 0.0) {
             return;
@@ -122,7 +123,7 @@ impl<'a> Law<'a> {
         }
     }
 
-    /// The reading `elapsed_s` seconds into a hold at `strain` that began with this memory.
+    /// Returns the reading `elapsed_s` seconds into a hold at `strain` that began with these branches.
     pub fn held(&self, strain: f64, memory: &[f64], elapsed_s: f64) -> f64 {
         self.reading(self.gauge(strain) + self.remembered(memory, elapsed_s))
     }
@@ -138,8 +139,8 @@ impl<'a> Law<'a> {
     }
 }
 
-/// Expected positive and negative part of a rate that is known to ± `sd`, with the logistic density that the filter
-/// uses for it.
+/// Returns the expected positive and negative part of a rate with standard deviation `sd`, with the logistic density that the
+/// filter uses.
 fn split(rate: f64, sd: f64) -> (f64, f64) {
     let scale = sd / 1.702;
     let spread = if scale > 0.0 { scale * (-rate.abs() / scale).exp().ln_1p() } else { 0.0 };

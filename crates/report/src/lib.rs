@@ -1,5 +1,5 @@
-//! The report: one HTML file that needs neither network nor scripts, with plots, scores and parameters. Where scripts run,
-//! plots tell the values under the pointer and can be zoomed.
+//! The report: one HTML file that needs neither network nor scripts, with plots, scores and parameters. With scripts, plots
+//! show the values under the pointer and can be zoomed.
 //!
 //! Any input gives a report: missing readings and references break lines, what cannot be drawn is said in words. Its
 //! size does not grow with the recording's length (`thin.rs`). The same input gives the same bytes.
@@ -41,7 +41,7 @@ use tables::Table;
 pub struct ReportInput<'a> {
     /// Heading, the recording's name for instance.
     pub title: &'a str,
-    /// Program and version.
+    /// Name and version of the program.
     pub made_by: &'a str,
     /// Times, s.
     pub time_s: &'a [f64],
@@ -57,7 +57,7 @@ pub struct ReportInput<'a> {
     pub params: &'a SensorParams,
     /// R₀ of this recording, in the unit of the readings.
     pub rest_reading: f64,
-    /// The part that the scores are about.
+    /// The part that is scored.
     pub scored: Scored,
     /// Sample that the part belongs to.
     pub sample: Sample,
@@ -74,14 +74,14 @@ pub struct ReportInput<'a> {
 /// The rows that are scored, by their times.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Scored {
-    /// Rows at this time, s, or later; all if there is none.
+    /// Rows at this time, s, or later; `None` for all.
     pub from_s: Option<f64>,
-    /// Rows before this time, s; all if there is none.
+    /// Rows before this time, s; `None` for all.
     pub until_s: Option<f64>,
 }
 
 impl Scored {
-    /// Rows from a time on, s, if there is one.
+    /// Returns the rows from a time on, s; all for `None`.
     #[must_use]
     pub const fn since(from_s: Option<f64>) -> Self {
         Self { from_s, until_s: None }
@@ -97,16 +97,16 @@ impl Scored {
 /// Overlap of rows with the calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sample {
-    /// All of them.
+    /// All rows were calibrated on.
     In,
-    /// Partly in the sample.
+    /// Some rows were calibrated on.
     Partly,
-    /// None.
+    /// No row was calibrated on.
     Out,
 }
 
 impl Sample {
-    /// Compares times, s, of a file's rows with those that a calibration has of the file of this hash.
+    /// Compares times, s, of a file's rows with those of the calibration's file with the same hash.
     #[must_use]
     pub fn of(time_s: &[f64], sha256: &str, params: &SensorParams, scored: Scored) -> Self {
         let of_it = params.recordings.iter().filter(|info| info.sha256 == sha256);
@@ -138,7 +138,7 @@ pub struct ScoreRow<'a> {
     pub rmse: f64,
     /// Root mean squared error in percent of full scale.
     pub rmse_percent_fs: f64,
-    /// Share of rows, 0 to 1, whose 95 % interval holds the reference; `None` for an estimator without intervals.
+    /// Share of rows, 0 to 1, whose 95 % interval contains the reference; `None` for an estimator without intervals.
     pub coverage_95: Option<f64>,
     /// Mean width of those intervals in percent of full scale.
     pub width_95_percent_fs: Option<f64>,
@@ -147,7 +147,7 @@ pub struct ScoreRow<'a> {
 }
 
 impl<'a> ScoreRow<'a> {
-    /// The part of an estimator's scores that a report has.
+    /// Selects the scores that a report shows.
     #[must_use]
     pub const fn new(name: &'a str, scores: &Scores) -> Self {
         Self {
@@ -161,7 +161,7 @@ impl<'a> ScoreRow<'a> {
     }
 }
 
-/// Reason for having no report.
+/// Reason why there is no report.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReportError {
@@ -194,7 +194,7 @@ struct Page<'a> {
 #[derive(Debug, Serialize)]
 struct Section {
     title: &'static str,
-    /// True if it is folded at first.
+    /// True if it is folded initially.
     folded: bool,
     text: String,
     figures: Vec<Figure>,
@@ -259,7 +259,7 @@ impl<'a> Report<'a> {
     pub fn figures(&self) -> Result<Vec<FigureFiles>, ReportError> {
         let figures = self.page.sections.iter().flat_map(|section| &section.figures);
         let Page { made_by, sample, .. } = self.page;
-        // What the rows are worth goes with each file, wherever it is taken.
+        // Each file carries the note on its rows, wherever it is taken.
         let made_by = if sample == Sample::Out { made_by.into() } else { format!("{made_by}, {}", sample.name()) };
         figures.map(|figure| files(&figure.chart, &figure.title, &figure.file, &made_by)).collect()
     }
@@ -268,10 +268,10 @@ impl<'a> Report<'a> {
 /// The template of a report.
 pub const PAGE: &str = include_str!("report.html");
 
-/// A chart as files of its own, `name` with endings.
+/// Returns a chart as files of its own; `name` is their name without the endings.
 ///
 /// # Errors
-/// If it cannot be drawn; no chart is known that cannot.
+/// If it cannot be drawn; no such chart is known.
 pub fn files(chart: &Chart, title: &str, name: &str, made_by: &str) -> Result<FigureFiles, ReportError> {
     let by = format!("Generated by {made_by}");
     let svg = chart.standalone(title)?;
@@ -279,7 +279,7 @@ pub fn files(chart: &Chart, title: &str, name: &str, made_by: &str) -> Result<Fi
     Ok(FigureFiles { name: name.into(), svg, csv })
 }
 
-/// A title as the name of a file.
+/// Converts a title to the name of a file.
 pub fn slug(title: &str) -> String {
     let word = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' };
     let name: String = title.chars().map(word).collect();

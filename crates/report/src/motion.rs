@@ -1,4 +1,4 @@
-//! Parts of a recording in which the strain rises, falls and stands still.
+//! Parts of a recording in which the strain rises, falls or is constant.
 
 use std::collections::VecDeque;
 
@@ -15,30 +15,30 @@ pub enum MotionKind {
     Hold,
 }
 
-/// A time in which the strain stands still.
+/// A period of constant strain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hold {
     /// First row.
     pub first: usize,
     /// Last row.
     pub last: usize,
-    /// The strain that is held.
+    /// Strain of the hold.
     pub strain: f64,
-    /// Its length, s.
+    /// Its duration, s.
     pub duration_s: f64,
 }
 
-/// Levels are apart by this share of what holds reach over.
+/// Smallest distance of two levels, as a share of the range of all holds.
 const LEVELS_APART: f64 = 0.1;
-/// A hold's strain stays within this share of the recording's whole range.
+/// Tolerance of a hold's strain, as a share of the recording's range.
 const TOLERANCE: f64 = 0.005;
-/// Factor on the tolerance for a check of a hold, which grows by its edges only; the turning point of a sine grows by 1.7, the tip
-/// of a triangle threefold.
+/// Factor on the tolerance for the check of a hold, which then grows at its edges only, by at most `MOST_GROWTH`; the turning
+/// point of a sine grows by 1.7, the tip of a triangle threefold.
 const WIDER: f64 = 3.0;
 const MOST_GROWTH: f64 = 1.35;
-/// Most holds that are looked for.
+/// Largest number of holds that are searched for.
 const MOST_HOLDS: usize = 200;
-/// A turning point counts when the strain goes back by this share of its range.
+/// Share of its range by which the strain must go back for a turning point.
 const TURN: f64 = 0.02;
 
 /// A row with known time and strain.
@@ -61,9 +61,9 @@ fn known(time_s: &[f64], strain: &[f64]) -> (Vec<Sample>, f64) {
     (samples, range.map_or(0.0, |(low, high)| high - low))
 }
 
-/// The holds of at least `shortest_s` seconds, longest first, without overlap.
+/// Returns the holds of at least `shortest_s` seconds, longest first, without overlap.
 ///
-/// A hold that the recording begins with is left out: nobody knows when it began.
+/// A hold at the start of the recording is left out, since its beginning is unknown.
 pub fn holds(time_s: &[f64], strain: &[f64], shortest_s: f64) -> Vec<Hold> {
     let (samples, range) = known(time_s, strain);
     if !(range > 0.0) {
@@ -87,7 +87,7 @@ pub fn holds(time_s: &[f64], strain: &[f64], shortest_s: f64) -> Vec<Hold> {
         .collect()
 }
 
-/// Holds with the first of each level before all others; levels are apart by a tenth of what holds reach over.
+/// Sorts holds so that the first of each level precedes all others; levels differ by a tenth of the range of all holds.
 pub fn levels_first(held: Vec<Hold>) -> Vec<Hold> {
     let Some((low, high)) = extent(held.iter().map(|hold| hold.strain)) else { return held };
     let mut levels: Vec<f64> = vec![];
@@ -100,8 +100,8 @@ pub fn levels_first(held: Vec<Hold>) -> Vec<Hold> {
     first
 }
 
-/// Longest windows of samples, both ends included, in which the strain stays within `tolerance`, starts and ends
-/// ascending.
+/// Returns the longest windows of samples, both ends included, in which the strain stays within `tolerance`, with starts and
+/// ends ascending.
 fn still_windows(samples: &[Sample], tolerance: f64) -> Vec<(usize, usize)> {
     let mut windows = vec![];
     let (mut lows, mut highs) = (VecDeque::new(), VecDeque::new());
@@ -149,16 +149,16 @@ fn length(samples: &[Sample], window: (usize, usize)) -> f64 {
     }
 }
 
-/// Length of the longest of the `wider` windows that contain a window.
+/// Returns the duration of the longest of the `wider` windows that contain a window.
 fn longest_around(samples: &[Sample], wider: &[(usize, usize)], window: (usize, usize)) -> f64 {
-    // Starts and ends ascend together, so the windows that contain this one are neighbours.
+    // Starts and ends both ascend, so that the windows that contain this one are neighbours.
     let until = wider.partition_point(|other| other.0 <= window.0);
     let around = wider.iter().take(until).rev().take_while(|other| other.1 >= window.1);
     around.map(|other| length(samples, *other)).fold(0.0, f64::max)
 }
 
-/// The hold in a window: from the first to the last row at which the strain is what it is in the window's middle half.
-/// The tolerance lets the window reach into the motions before and after.
+/// Returns the hold in a window: from the first to the last row whose strain matches that of the window's middle half. Because
+/// of the tolerance, the window may extend into the movements before and after.
 fn hold(samples: &[Sample], window: (usize, usize)) -> Option<Hold> {
     let samples = samples.get(window.0..=window.1)?;
     let quarter = samples.len() / 4;
@@ -170,7 +170,7 @@ fn hold(samples: &[Sample], window: (usize, usize)) -> Option<Hold> {
     Some(Hold { first: first.row, last: last.row, strain, duration_s: last.time_s - first.time_s })
 }
 
-/// Returns the motion of the strain at each row: turning points are found by the distance that the strain goes back, `holds` laid over it.
+/// Returns the motion of the strain at each row: turning points by the distance that the strain goes back, overlaid by `holds`.
 pub fn motions(time_s: &[f64], strain: &[f64], holds: &[Hold]) -> Vec<MotionKind> {
     let (samples, range) = known(time_s, strain);
     let mut motions = vec![MotionKind::Extend; time_s.len()];
@@ -213,7 +213,7 @@ mod tests {
         (0..rows).map(|k| 0.1 * k as f64).collect()
     }
 
-    /// Rest, ramp up, hold, ramp down, hold; with a little noise and a missing value.
+    /// Returns rest, ramp up, hold, ramp down, hold; with a little noise and a missing value.
     fn protocol() -> (Vec<f64>, Vec<f64>) {
         let time = clock(1500);
         let mut strain: Vec<f64> = time
@@ -262,7 +262,7 @@ mod tests {
         assert_eq!(motions(&[0.0], &[f64::NAN], &[]).len(), 1);
     }
 
-    /// Step-holds return to zero after every level, and stay there longest.
+    /// Tests holds that return to zero after every level, and stay there longest.
     #[test]
     fn a_hold_of_each_level_comes_first() {
         let hold = |strain: f64, duration_s: f64| Hold { first: 0, last: 1, strain, duration_s };

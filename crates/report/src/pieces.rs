@@ -1,4 +1,4 @@
-//! A long recording piece by piece, so that every movement can be seen.
+//! A long recording piece by piece, with every movement visible.
 
 use super::ReportError;
 use super::axis::extent;
@@ -8,12 +8,12 @@ use super::motion::MotionKind;
 use super::recording::PlottedRecording;
 use ohmstrain::number::significant;
 
-/// Movements that one plot shows well, and most plots: a piece has some 30 kB.
+/// Number of movements that one plot shows well, and largest number of plots: a piece takes some 30 kB.
 const MOVEMENTS: usize = 14;
 const MOST_PIECES: usize = 48;
 /// Height of a piece, px.
 const HEIGHT_PX: f64 = 220.0;
-/// Least width of a movement of usual length, as a share of the plot's.
+/// Smallest width of a movement of usual length, as a share of the plot's width.
 const VISIBLE: f64 = 1.0 / 40.0;
 
 /// Draws the strain in pieces of equal numbers of rows, with a sentence on them; no figure if one plot shows all movements.
@@ -43,8 +43,8 @@ pub fn strain(recording: &PlottedRecording) -> Result<(Vec<Figure>, String), Rep
     Ok(((0..pieces).map(piece).collect::<Result<_, ReportError>>()?, note))
 }
 
-/// Returns the number of pieces: enough for the number of movements, and for movements that are short beside the recording, like
-/// ramps between long holds.
+/// Returns the number of pieces. It is enough for all movements, and for movements that are short compared with the recording,
+/// such as ramps between long holds.
 fn count(motions: &[MotionKind], time_s: &[f64]) -> usize {
     let ends: Vec<usize> = (1..motions.len()).filter(|row| motions[*row] != motions[*row - 1]).collect();
     let lasting = |pair: &[usize]| time_s.get(pair[1]).zip(time_s.get(pair[0])).map(|(end, start)| end - start);
@@ -62,7 +62,7 @@ mod tests {
 
     #[test]
     fn short_movements_between_long_holds_make_pieces() {
-        // Eight ramps of 10 s in 2400 s are 1/240 of it each: a plot that shows one at a fortieth of its width has a sixth.
+        // Eight ramps of 10 s in 2400 s are 1/240 of it each; at a fortieth of its width per ramp, a plot shows a sixth of the recording.
         let phase = |k: usize| match k % 600 {
             0..10 => MotionKind::Extend,
             300..310 => MotionKind::Retract,
@@ -76,7 +76,7 @@ mod tests {
             (0..1000).map(|k| if k / 100 % 2 == 0 { MotionKind::Extend } else { MotionKind::Retract }).collect();
         assert_eq!(count(&ramps, &time_s[..1000]), 1);
         assert_eq!(count(&[], &[]), 0);
-        // The number follows the length: a hundred such recordings in a row take a hundred times as many.
+        // The number is proportional to the length: a hundred such recordings in a row take a hundred times as many.
         let long_s: Vec<f64> = (0..240_000).map(|k| k as f64).collect();
         let long: Vec<MotionKind> = (0..240_000).map(phase).collect();
         assert_eq!(count(&long, &long_s), 600);

@@ -1,4 +1,4 @@
-//! A recording with what the plots derive from it.
+//! A recording with the data derived from it for the plots.
 
 use ohmstrain::Estimate;
 use ohmstrain_sensor::{Quantity, ReadingUnit, SensorParams};
@@ -9,14 +9,14 @@ use super::motion::{self, Hold, MotionKind};
 use super::{ReportInput, Scored};
 use ohmstrain::number::significant;
 
-/// Shortest hold whose relaxation is worth a plot, s.
+/// Shortest hold whose relaxation is plotted, s.
 pub const SHORTEST_HOLD_S: f64 = 5.0;
-/// Holds that are plotted.
+/// Number of holds that are plotted.
 const PLOTTED_HOLDS: usize = 4;
-/// Points of a gauge curve.
+/// Number of points of a gauge curve.
 const CURVE_POINTS: u32 = 200;
 
-/// The report's input and what follows from it.
+/// The report's input and the data derived from it.
 pub struct PlottedRecording<'a> {
     /// Times, s.
     pub time_s: &'a [f64],
@@ -83,41 +83,41 @@ impl<'a> PlottedRecording<'a> {
         }
     }
 
-    /// The reference, or the estimate where there is none.
+    /// Returns the reference, or else the estimate.
     pub fn known_strain(&self) -> &[f64] {
         &self.strain
     }
 
-    /// The holds that are plotted, at most four: the longest of each level, then the longest others.
+    /// Returns the plotted holds, at most four: the longest of each level, then the longest others.
     pub fn longest_holds(&self) -> &[Hold] {
         self.held.get(..PLOTTED_HOLDS).unwrap_or(&self.held)
     }
 
-    /// All holds: the longest of each level, then the others, longest first.
+    /// Returns all holds: the longest of each level, then the others, longest first.
     pub fn holds(&self) -> &[Hold] {
         &self.held
     }
 
-    /// Returns the law's memory at the start of one of the longest holds.
+    /// Returns the state of the law's branches at the start of one of the longest holds.
     pub fn memory_at(&self, row: usize) -> Option<&[f64]> {
         self.held_driven.memories.get(&row).map(Vec::as_slice)
     }
 
-    /// Points (strain, g) of the gauge curve over a range.
+    /// Returns points (strain, g) of the gauge curve over a range.
     pub fn gauge_curve(&self, range: Option<(f64, f64)>) -> Vec<(f64, f64)> {
         let Some((low, high)) = range else { return vec![] };
         let at = |i: u32| low + f64::from(i) / f64::from(CURVE_POINTS) * (high - low);
         (0..=CURVE_POINTS).map(|i| (at(i), self.law.gauge(at(i)))).collect()
     }
 
-    /// Points (strain, reading) of the static calibration over the readings.
+    /// Returns points (strain, reading) of the static calibration over the readings.
     pub fn static_curve(&self) -> Vec<(f64, f64)> {
         let Some((low, high)) = extent(self.reading.iter().copied()) else { return vec![] };
         let at = |i: u32| low + f64::from(i) / f64::from(CURVE_POINTS) * (high - low);
         (0..=CURVE_POINTS).map(|i| (self.params.static_cubic.strain(at(i)), at(i))).collect()
     }
 
-    /// Axis label of the readings.
+    /// Returns the axis label of the readings.
     pub fn reading_label(&self) -> &'static str {
         match self.params.reading {
             ReadingUnit::Ohm => "Resistance, Ω",
@@ -125,7 +125,7 @@ impl<'a> PlottedRecording<'a> {
         }
     }
 
-    /// The estimated quantity.
+    /// Returns the name of the estimated quantity.
     pub fn quantity_name(&self) -> &'static str {
         match self.params.quantity {
             Quantity::Strain => "Strain",
@@ -133,7 +133,7 @@ impl<'a> PlottedRecording<'a> {
         }
     }
 
-    /// A value of the estimated quantity as people read it: strain in percent.
+    /// Converts a value of the estimated quantity to the unit that people read: strain in percent.
     pub fn shown(&self, value: f64) -> f64 {
         match self.params.quantity {
             Quantity::Strain => 100.0 * value,
@@ -141,7 +141,7 @@ impl<'a> PlottedRecording<'a> {
         }
     }
 
-    /// Axis label of the estimated quantity.
+    /// Returns the axis label of the estimated quantity.
     pub fn quantity_label(&self) -> &'static str {
         match self.params.quantity {
             Quantity::Strain => "Strain, %",
@@ -149,13 +149,13 @@ impl<'a> PlottedRecording<'a> {
         }
     }
 
-    /// Axis label of the reference, or of the estimate that stands for it.
+    /// Returns the axis label of the reference, or of the estimate in its place.
     pub fn known_strain_label(&self) -> String {
         let source = if self.truth.is_some() { "reference" } else { "estimated" };
         format!("{} ({source})", self.quantity_label())
     }
 
-    /// A value of the estimated quantity.
+    /// Formats a value of the estimated quantity with its unit.
     pub fn with_unit(&self, value: f64) -> String {
         match self.params.quantity {
             Quantity::Strain => format!("strain {} %", significant(100.0 * value, 3)),
@@ -163,10 +163,10 @@ impl<'a> PlottedRecording<'a> {
         }
     }
 
-    /// The 95 % interval of an estimate, within the limits of the output.
+    /// Returns the 95 % interval of an estimate, within the limits of the output.
     pub fn interval(&self, row: &Estimate) -> (f64, f64) {
         let (limits, half) = (self.params.limits, Z_95 * row.strain_sd);
-        // A limit that is not a number bounds nothing.
+        // A limit that is NaN bounds nothing.
         let within = |x: f64| if x.is_nan() { x } else { x.max(limits.lower).min(limits.upper) };
         (within(row.strain - half), within(row.strain + half))
     }
@@ -175,11 +175,11 @@ impl<'a> PlottedRecording<'a> {
 /// Half-width of the 95 % interval of a standard normal.
 pub const Z_95: f64 = 1.96;
 
-/// Share of the limits' span within which an estimate leans on them.
+/// Distance from the limits below which an estimate counts as being at them, as a share of their span.
 const AT_LIMIT: f64 = 0.02;
 
-/// True if an estimated strain is away from the limits: an estimate that they hold back does not mean that the body stands
-/// still.
+/// True if an estimated strain is away from the limits. An estimate that is clamped to them does not show that the body is at
+/// rest.
 fn is_free(strain: f64, params: &SensorParams) -> bool {
     let (limits, margin) = (params.limits, AT_LIMIT * params.limits.span());
     strain > limits.lower + margin && strain < limits.upper - margin

@@ -1,4 +1,4 @@
-//! The plots of readings against strain.
+//! Plots of readings against strain.
 
 use super::ReportError;
 use super::axis::{Axis, extent};
@@ -10,10 +10,10 @@ use super::recording::PlottedRecording;
 use super::thin::Point;
 use ohmstrain::number::{plain, significant};
 
-/// Arrows on a plot at most.
+/// Largest number of arrows on a plot.
 const MOST_ARROWS: usize = 24;
 
-/// Readings against strain in the course of time, with the gauge curve.
+/// Draws readings against strain in the course of time, with the gauge curve.
 pub fn hysteresis(recording: &PlottedRecording) -> Result<Figure, ReportError> {
     let strain = recording.known_strain();
     let shown = |x: f64| recording.shown(x);
@@ -47,7 +47,7 @@ pub fn hysteresis(recording: &PlottedRecording) -> Result<Figure, ReportError> {
     Figure::new(chart, "Hysteresis loop", note, false)
 }
 
-/// A step in the middle of each movement, of some of them if there are many.
+/// Returns a step in the middle of each movement, or of some of them if there are many.
 fn arrows(recording: &PlottedRecording) -> Vec<(Point, Point)> {
     let (motions, strain) = (&recording.motions, recording.known_strain());
     let mut movements: Vec<(usize, usize)> = vec![];
@@ -60,11 +60,11 @@ fn arrows(recording: &PlottedRecording) -> Vec<(Point, Point)> {
             first = row;
         }
     }
-    // An odd number, so that both directions get their share.
+    // An odd stride, so that both directions are included.
     let every = movements.len().div_ceil(MOST_ARROWS) | 1;
     let step = |(first, last): (usize, usize)| {
         let at = |row: usize| Some((recording.shown(*strain.get(row)?), *recording.reading.get(row)?));
-        // Over a tenth of the movement, so that noise does not turn it.
+        // Over a tenth of the movement, so that noise does not reverse the arrow.
         let (middle, reach) = (first.midpoint(last), ((last - first) / 10).max(1));
         let (from, to) = (at(middle.saturating_sub(reach))?, at(middle)?);
         [from.0, from.1, to.0, to.1].iter().all(|x| x.is_finite()).then_some((from, to))
@@ -72,7 +72,7 @@ fn arrows(recording: &PlottedRecording) -> Vec<(Point, Point)> {
     movements.into_iter().step_by(every).filter_map(step).collect()
 }
 
-/// Draws the gauge curve where it was fitted, with the recording's evidence on it, and its slopes.
+/// Draws the gauge curve over the fitted range, with the recording's settled readings, and its slopes.
 pub fn gauge(recording: &PlottedRecording) -> Result<Figure, ReportError> {
     let range = recording.params.law.range;
     let curve = recording.gauge_curve(Some((range.lower, range.upper)));
@@ -111,8 +111,8 @@ fn plain_slope(slope: f64) -> String {
     if slope.is_finite() { significant(slope, 3) } else { plain(slope) }
 }
 
-/// Strain and relative change of every reading, less what the law, driven by the reference, adds for movement and
-/// relaxation; nothing without a reference.
+/// Returns strain and relative change of every reading, minus the law's contributions of movement and relaxation, with the law
+/// driven by the reference; empty without a reference.
 fn settled_readings(recording: &PlottedRecording) -> Vec<(f64, f64)> {
     let Some(driven) = &recording.driven else { return vec![] };
     let rows = recording.known_strain().iter().zip(recording.reading).zip(&driven.reading);

@@ -1,4 +1,4 @@
-//! Loops at several speeds beside each other.
+//! Hysteresis loops at several speeds side by side.
 
 use super::ReportError;
 use super::axis::{Axis, extent};
@@ -9,15 +9,15 @@ use super::motion::MotionKind;
 use super::recording::PlottedRecording;
 use ohmstrain::number::significant;
 
-/// Classes of speed, at most.
+/// Largest number of classes of speed.
 const CLASSES: usize = 3;
-/// Speeds that differ by less than this factor are one.
+/// Ratio of speeds from which they count as different.
 const SEVERAL: f64 = 1.5;
-/// Speeds that classes are made of: the work grows with their square.
+/// Largest number of speeds that are classified; the work grows with their square.
 const MOST_SPEEDS: usize = 300;
-/// Share of a movement's way at either end that does not count for its speed.
+/// Share of a movement's travel at either end that does not count towards its speed.
 const ENDS: f64 = 0.1;
-/// Movements over a smaller share of the strain's range are none: a hold has such, too.
+/// Smallest travel of a movement, as a share of the strain's range; holds contain smaller ones.
 const LEAST_WAY: f64 = 0.1;
 
 /// A movement: rows, both included, and its mean speed.
@@ -27,7 +27,7 @@ struct Movement {
     speed: f64,
 }
 
-/// Readings against strain, coloured by the speed of each movement; nothing where all movements are alike.
+/// Draws readings against strain, coloured by the speed of each movement; `None` if all speeds are alike.
 pub fn loops(recording: &PlottedRecording) -> Result<Option<Figure>, ReportError> {
     let movements = movements(recording);
     let mut speeds: Vec<f64> = movements.iter().map(|movement| movement.speed).collect();
@@ -67,8 +67,8 @@ pub fn loops(recording: &PlottedRecording) -> Result<Option<Figure>, ReportError
     Figure::new(chart, "Loops by speed", note, false).map(Some)
 }
 
-/// Slowest and fastest of each class of speeds, which are in order: the classes within which their logarithms differ least
-/// (Fisher, *J. Am. Stat. Assoc.* 53 (1958) 789).
+/// Splits sorted speeds into classes with the smallest variation of their logarithms (Fisher, *J. Am. Stat. Assoc.* 53 (1958)
+/// 789). Returns the slowest and the fastest of each class.
 fn natural_classes(speeds: &[f64]) -> Vec<(f64, f64)> {
     let logarithms: Vec<f64> = speeds.iter().map(|speed| speed.ln()).collect();
     let sums = |power: i32| -> Vec<f64> {
@@ -107,7 +107,7 @@ fn movements(recording: &PlottedRecording) -> Vec<Movement> {
         let known = |row: &usize| time_s.get(*row).zip(strain.get(*row)).is_some_and(|(_, x)| x.is_finite());
         let (Some(from), Some(to)) = ((begin..=last).find(known), (begin..=last).rfind(known)) else { continue };
         let way = (strain[to] - strain[from]).abs();
-        // Without the ends, where it may have stood still for a while.
+        // Without the ends, at which the body may have stood still.
         let at = |share: f64| (from..=to).find(|row| (strain[*row] - strain[from]).abs() >= share * way);
         let (Some(from), Some(to)) = (at(ENDS), at(1.0 - ENDS)) else { continue };
         let speed = (strain[to] - strain[from]).abs() / (time_s[to] - time_s[from]);

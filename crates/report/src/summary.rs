@@ -7,7 +7,7 @@ use super::recording::PlottedRecording;
 use super::{ReportInput, ScoreRow, Scored, axis};
 use ohmstrain::number::{percent, plain, significant};
 
-/// The result in words.
+/// Returns the result in words.
 pub fn headline(input: &ReportInput, recording: &PlottedRecording) -> String {
     match input.scores.first() {
         Some(score) => scored(score, input),
@@ -40,7 +40,7 @@ fn scored(score: &ScoreRow, input: &ReportInput) -> String {
     format!("{what} to {error} of full scale RMS ({own}), {}{part}{coverage}.", input.sample.name())
 }
 
-/// Describes the length of the recording, and what is missing.
+/// Describes the length of the recording, and missing data.
 pub fn extent_of(recording: &PlottedRecording) -> String {
     let rows = recording.time_s.len();
     let missing = rows.saturating_sub(recording.reading.iter().filter(|reading| reading.is_finite()).count());

@@ -24,7 +24,7 @@ impl Table {
     }
 }
 
-/// Unit of the estimated quantity.
+/// Returns the unit of the estimated quantity.
 pub fn unit(quantity: Quantity) -> &'static str {
     match quantity {
         Quantity::Strain => "–",
@@ -32,7 +32,7 @@ pub fn unit(quantity: Quantity) -> &'static str {
     }
 }
 
-/// The unit of something per quantity to the given power, `per` in front of it.
+/// Returns the unit of `per` over the given power of the quantity.
 fn per_quantity(quantity: Quantity, power: usize) -> String {
     let raised = ["", "", "²", "³"].get(power).copied().unwrap_or("");
     match quantity {
@@ -41,7 +41,7 @@ fn per_quantity(quantity: Quantity, power: usize) -> String {
     }
 }
 
-/// The unit of the quantity's rate, or of its second derivative.
+/// Returns the unit of the quantity's rate, or of its second derivative.
 fn per_time(quantity: Quantity) -> String {
     match quantity {
         Quantity::Strain => "1/s".into(),
@@ -49,7 +49,7 @@ fn per_time(quantity: Quantity) -> String {
     }
 }
 
-/// Scores, one estimator per row.
+/// Returns the table of scores, one estimator per row.
 pub fn scores(rows: &[ScoreRow], quantity: Quantity, sample: Sample) -> Table {
     let rmse = match quantity {
         Quantity::Strain => "RMSE (strain)",
@@ -100,7 +100,7 @@ struct ParameterRows<'a> {
 }
 
 impl ParameterRows<'_> {
-    /// Adds the value that the filter runs with, and its uncertainty under its `path` in the sensor's file.
+    /// Adds a value of the law in use, and its uncertainty under its `path` in the sensor's file.
     fn fitted(&mut self, name: &str, path: &str, value: f64, unit: &str) {
         let place = self.uncertainty.and_then(|known| known.names.iter().position(|name| name == path));
         self.found.extend(place);
@@ -108,7 +108,7 @@ impl ParameterRows<'_> {
         self.rows.push([name.into(), plain(value), told, unit.into()]);
     }
 
-    /// Errors of whatever has no row of its own.
+    /// Adds the errors of parameters without a row of their own.
     fn rest(&mut self) {
         let Some(known) = self.uncertainty else { return };
         let entries = known.names.iter().zip(&known.values).zip(&known.standard_errors).enumerate();
@@ -120,7 +120,7 @@ impl ParameterRows<'_> {
     }
 }
 
-/// Formats a parameter as the recordings determine it; one whose interval holds zero is not determined.
+/// Formats the estimate of a parameter from the recordings; one whose interval contains zero is not determined.
 fn told(known: &Uncertainty, place: Option<usize>) -> String {
     let at = |values: &[f64]| place.and_then(|place| values.get(place).copied());
     match (at(&known.values), at(&known.standard_errors)) {

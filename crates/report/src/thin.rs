@@ -1,22 +1,22 @@
-//! Fewer points for the same picture.
+//! Thinning of points without a visible change of the picture.
 //!
-//! A million rows on a plot some hundred columns wide cannot be seen one by one, but one spike among them must be. A
-//! line keeps, of each column, the first, the lowest, the highest and the last point in their order: drawn, this is
-//! indistinguishable from the whole (Jugel, Jerzak, Hackenbroich, Markl, "M4", *Proc. VLDB Endow.* 7, 2014). A loop
-//! comes back to every column; there a point is dropped if its cell of the plot has been visited in the same colour.
+//! A million rows on a plot some hundred columns wide cannot be seen one by one, but a single spike among them must be. For
+//! each column, a line keeps the first, the lowest, the highest and the last point, in their order; the drawing is
+//! indistinguishable from that of the whole line (Jugel, Jerzak, Hackenbroich, Markl, "M4", *Proc. VLDB Endow.* 7, 2014). A
+//! loop returns to every column; a point of it is dropped if its cell of the plot has been visited in the same colour.
 //!
-//! Coordinates are shares of the plot's width and height; NaN breaks a line.
+//! Coordinates are fractions of the plot's width and height; NaN breaks a line.
 
 /// A point of a plot.
 pub type Point = (f64, f64);
 
-/// Most points that a loop keeps as long as its cells are not coarser than the coarsest grid.
+/// Largest number of points of a loop, unless its cells would have to be coarser than the coarsest grid.
 const MOST_LOOP_POINTS: usize = 12_000;
-/// Cells per side of the grids that a loop is thinned with, tried in this order.
+/// Cells per side of the grids for thinning a loop, tried in this order.
 const LOOP_GRIDS: [usize; 4] = [600, 300, 150, 75];
 
-/// Pieces of a line, thinned to four points per column. Where points are not finite the line is broken, unless it goes
-/// on in the same column, where the gap could not be seen.
+/// Returns the pieces of a line, thinned to four points per column. The line is broken at points that are not finite, unless it
+/// continues in the same column, where the gap would not be visible.
 pub fn line(points: impl IntoIterator<Item = Point>, columns: usize) -> Vec<Vec<Point>> {
     let mut pieces = vec![];
     let mut piece = Piece::new(columns);
@@ -43,7 +43,7 @@ struct Piece {
     open: Option<Column>,
 }
 
-/// The points of one column that are kept, each with its place in the column.
+/// Points of one column that are kept, each with its index in the column.
 struct Column {
     number: f64,
     count: usize,
@@ -115,7 +115,7 @@ impl Column {
     }
 }
 
-/// Outlines of a band, one per unbroken piece, from `(x, lower, upper)`: of each column the lowest lower and the
+/// Returns the outlines of a band, one per unbroken piece, from `(x, lower, upper)`: for each column the lowest lower and the
 /// highest upper border.
 pub fn band(points: impl IntoIterator<Item = (f64, f64, f64)>, columns: usize) -> Vec<Vec<Point>> {
     let columns = columns.max(1) as f64;
@@ -149,7 +149,7 @@ fn outline(kept: &mut Vec<(f64, f64, f64, f64)>) -> Option<Vec<Point>> {
     (columns.len() > 1).then(|| there.chain(back).collect())
 }
 
-/// Pieces of one colour of a line that crosses itself, with the colour of each. `points` are `(x, y, colour)`; a step
+/// Returns the single-coloured pieces of a line that crosses itself, with their colours. `points` are `(x, y, colour)`; a step
 /// between two points has the colour of the second one.
 pub fn loops(points: &[(f64, f64, usize)]) -> Vec<(usize, Vec<Point>)> {
     if points.len() <= MOST_LOOP_POINTS {
@@ -167,7 +167,7 @@ pub fn loops(points: &[(f64, f64, usize)]) -> Vec<(usize, Vec<Point>)> {
     pieces
 }
 
-/// The steps that end in a point that is wanted, joined to pieces of one colour.
+/// Joins the steps that end in a wanted point to pieces of one colour.
 fn pieces_of(
     points: &[(f64, f64, usize)],
     mut wanted: impl FnMut(&(f64, f64, usize)) -> bool,

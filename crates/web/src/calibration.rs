@@ -1,4 +1,4 @@
-//! Calibration, with its progress, as `ohmstrain calibrate` does it.
+//! Calibration as by `ohmstrain calibrate`, with progress.
 
 use js_sys::{Date, Function, JSON};
 use ohmstrain::trace::{TraceFile, check_alike, first_distrusted_rows, known_recordings};
@@ -22,7 +22,7 @@ struct Choices {
     estimator: Option<String>,
     branches: Option<usize>,
     gauge: Option<String>,
-    /// True if a late reference is to be moved.
+    /// True if a late reference is moved.
     align: bool,
     from: Option<f64>,
     until: Option<f64>,
@@ -58,7 +58,7 @@ impl Choices {
     }
 }
 
-/// An estimator by its name.
+/// Returns an estimator by its name.
 pub fn estimator(name: &str) -> Result<EstimatorKind, String> {
     EstimatorKind::ALL.into_iter().find(|kind| kind.name() == name).ok_or_else(|| {
         let names = EstimatorKind::ALL.map(EstimatorKind::name).join(", ");
@@ -80,7 +80,8 @@ pub struct Calibrated {
     times: Vec<Vec<f64>>,
 }
 
-/// Calibrates a sensor on recordings with known strain. `progress` is called with a stage in words and a share of it, 0 to 1.
+/// Calibrates a sensor on recordings with known strain. `progress` is called with the stage in words and its completed share, 0
+/// to 1.
 #[wasm_bindgen]
 pub fn calibrate(
     recordings: Vec<Recording>,
@@ -145,7 +146,7 @@ fn run(wholes: Vec<TraceFile>, choices: &Choices, progress: Option<&Function>) -
     Ok(Calibrated { lines, facts, is_better, advice, warnings, tested, times, left_out: calibrated.left_out, sensor })
 }
 
-/// Calibrates a sensor on recordings: untrustworthy rows are left out first, and doubts are answered.
+/// Calibrates a sensor on recordings: untrustworthy rows are left out first, and doubts are raised.
 fn of_recordings(
     recordings: &[TraceFile],
     calibration: Calibration,
@@ -176,7 +177,7 @@ fn of_recordings(
     Ok(calibrated)
 }
 
-/// An error's text.
+/// Returns an error's text.
 fn text(error: impl ToString) -> String {
     error.to_string()
 }
@@ -189,18 +190,18 @@ fn tell(progress: Option<&Function>, stage: Stage) {
         Stage::Noise { done, expected } => ("fitting noise and motion", done as f64 / expected.max(done).max(1) as f64),
         Stage::LeftOut => ("checking parts left out", 1.0),
     };
-    // A listener that fails does not stop a calibration.
+    // A callback that fails does not stop a calibration.
     let _ = progress.call2(&JsValue::NULL, &words.into(), &share.into());
 }
 
 #[wasm_bindgen]
 impl Calibrated {
-    /// The sensor.
+    /// Returns the sensor.
     pub fn sensor(&self) -> Sensor {
         Sensor::new(self.sensor.clone(), self.facts.clone(), self.tested)
     }
 
-    /// The verdict and what it rests on: names and sentences, as `ohmstrain calibrate` prints them.
+    /// Returns the verdict and its basis: names and sentences, as `ohmstrain calibrate` prints them.
     #[wasm_bindgen(unchecked_return_type = "[string, string][]")]
     pub fn lines(&self) -> Result<JsValue, JsError> {
         json(&self.lines)
@@ -211,19 +212,19 @@ impl Calibrated {
         self.advice.clone()
     }
 
-    /// Returns the warnings that cast doubt on it.
+    /// Returns the warnings about the result.
     pub fn warnings(&self) -> Vec<String> {
         self.warnings.clone()
     }
 
-    /// True if it is better than a static curve, by more than chance; undefined if that is unknown.
+    /// True if its errors are below 0.9 times those of a static curve; undefined if they are unknown.
     #[wasm_bindgen(getter, js_name = isBetter)]
     pub fn is_better(&self) -> Option<bool> {
         self.is_better
     }
 
-    /// Rows of quarters that were left out, in the order of recordings and times: six columns, one after the other, of recording,
-    /// time in s, reference, strain, its deviation, and the static cubic's strain.
+    /// Returns the held-out rows, in the order of recordings and times, as six consecutive columns: recording, time in s,
+    /// reference, strain, its deviation, and the static cubic's strain.
     #[wasm_bindgen(js_name = leftOut)]
     pub fn left_out(&self) -> Vec<f64> {
         let mut rows = self.left_out.clone();

@@ -1,9 +1,10 @@
-//! Doubts of the library in the words of the command line: which flag answers them. Refusals are errors, the rest warnings.
+//! Doubts of the library in the words of the command line, with the flags that answer them. Refusals are errors, the others
+//! warnings.
 
 use ohmstrain::trace::{TraceFile, doubt_text};
 use ohmstrain::{CalibrationDoubt, Interface, LagAnswer};
 
-/// Warnings of doubts about a calibration; the first one that has to be answered is an error.
+/// Adds the warnings about a calibration; the first doubt that needs an answer is an error.
 pub fn heed(recordings: &[TraceFile], doubts: &[CalibrationDoubt], warnings: &mut Vec<String>) -> Result<(), String> {
     for doubt in doubts {
         let text = doubt_text(doubt, recordings);

@@ -1,4 +1,4 @@
-//! A recording through a sensor's filter or smoother: the rows of `estimates.csv`.
+//! Filtering and smoothing of a recording: the rows of `estimates.csv`.
 
 use std::io;
 
@@ -10,7 +10,8 @@ use wasm_bindgen::prelude::*;
 use crate::json::refused;
 use crate::recording::seated;
 
-/// Readings at the start of a recording that are looked at before it is filtered, and rows among which they are looked for.
+/// Number of readings at the start of a recording that are checked before it is filtered, and number of rows that are searched
+/// for them.
 const FIRST_READINGS: usize = 100;
 const MOST_FIRST_ROWS: usize = 10 * FIRST_READINGS;
 
@@ -24,12 +25,12 @@ pub struct Estimates {
 
 #[wasm_bindgen]
 impl Estimates {
-    /// Names of the columns.
+    /// Returns the names of the columns.
     pub fn columns(&self) -> Vec<String> {
         self.columns.iter().map(|column| column.name().to_owned()).collect()
     }
 
-    /// The numbers of a column, counted from 0; NaN where they are not known, and for the flags.
+    /// Returns the numbers of a column, counted from 0; NaN if they are unknown, and for the flags.
     pub fn column(&self, index: usize) -> Vec<f64> {
         let numbers = |column: &Column| self.rows.iter().map(|row| column.number(row)).collect();
         self.columns.get(index).map_or_else(Vec::new, numbers)
@@ -42,7 +43,7 @@ impl Estimates {
         Ok(bytes)
     }
 
-    /// Returns the warnings that cast doubt on them.
+    /// Returns the warnings about them.
     pub fn warnings(&self) -> Vec<String> {
         self.warnings.clone()
     }
@@ -67,7 +68,7 @@ impl Estimates {
     }
 }
 
-/// Through the filter, row by row.
+/// Filters a recording row by row.
 pub fn filtered(sensor: &Sensor, recording: &TraceFile) -> Result<Estimates, String> {
     let sensor = seated(sensor, recording)?;
     check_readings(&sensor, recording, first_rows(recording))?;
@@ -86,7 +87,7 @@ pub fn filtered(sensor: &Sensor, recording: &TraceFile) -> Result<Estimates, Str
     Ok(estimates)
 }
 
-/// Through the smoother.
+/// Smooths a recording.
 pub fn smoothed(sensor: &Sensor, recording: &TraceFile) -> Result<Estimates, String> {
     let sensor = seated(sensor, recording)?;
     check_readings(&sensor, recording, recording.trace.len())?;
@@ -101,7 +102,7 @@ pub fn smoothed(sensor: &Sensor, recording: &TraceFile) -> Result<Estimates, Str
     Ok(made(&sensor, recording, rows))
 }
 
-/// Returns the number of rows that are looked at first.
+/// Returns the number of rows that are searched first.
 fn first_rows(recording: &TraceFile) -> usize {
     let is_known = |row: &usize| recording.trace.readings.values[*row].is_finite();
     let enough = (0..recording.trace.len()).filter(is_known).nth(FIRST_READINGS - 1);

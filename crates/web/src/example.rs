@@ -7,7 +7,7 @@ use wasm_bindgen::prelude::*;
 use crate::json::refused;
 use crate::recording::Recording;
 
-/// A simulated bench session, that of `ohmstrain demo` with this seed.
+/// Simulates the bench session of `ohmstrain demo` with this seed.
 #[wasm_bindgen]
 pub fn example(seed: u32) -> Result<Recording, JsError> {
     let settings = SimulationSettings { seed: seed.into(), ..SimulationSettings::example() };

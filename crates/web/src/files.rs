@@ -1,4 +1,4 @@
-//! A lab's files: bytes in, what stands in them out.
+//! A lab's files: from bytes to recordings.
 
 use ohmstrain_bench_data::Trace;
 use ohmstrain_bench_data::import::{LARGEST_FILE, Table, read_table};
@@ -9,7 +9,7 @@ use crate::json::refused;
 use crate::recording::Recording;
 use crate::said;
 
-/// Files of one recording, as a lab wrote them: text, XLSX, Parquet, each perhaps in gzip.
+/// Files of one recording, as a lab wrote them: text, XLSX, Parquet, each optionally in gzip.
 #[wasm_bindgen]
 #[derive(Default)]
 pub struct Files {
@@ -18,13 +18,13 @@ pub struct Files {
 
 #[wasm_bindgen]
 impl Files {
-    /// No file yet.
+    /// Creates an empty list of files.
     #[wasm_bindgen(constructor)]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Another file of the recording.
+    /// Adds a file of the recording.
     pub fn add(&mut self, name: String, bytes: Vec<u8>) -> Result<(), JsError> {
         if bytes.len() as u64 > LARGEST_FILE {
             let most = LARGEST_FILE >> 20;
@@ -35,8 +35,8 @@ impl Files {
         Ok(())
     }
 
-    /// Inspects the files: their contents, and the recording or the question that follows. `said` are flags of `ohmstrain import`, as a
-    /// shell takes them.
+    /// Inspects the files: their contents, and the recording or the question that follows. `said` are flags of
+    /// `ohmstrain import` in the syntax of a shell.
     pub fn inspect(&self, said: &str) -> Result<Inspection, JsError> {
         let recipe = said::recipe(said).map_err(refused)?;
         for (name, bytes) in &self.files {
@@ -60,7 +60,7 @@ impl Files {
 }
 
 impl Files {
-    /// The file itself, if it is a trace that reads as it would be imported.
+    /// Returns the file itself, if it is a trace that an import would not change.
     fn as_is(&self, imported: &Trace) -> Option<Recording> {
         let [(name, bytes)] = &self.files[..] else { return None };
         if bytes.starts_with(b"PAR1") {
@@ -72,7 +72,7 @@ impl Files {
         is_same.then_some(recording)
     }
 
-    /// A trace as `ohmstrain import` writes it.
+    /// Returns a trace in the form that `ohmstrain import` writes.
     fn imported(&self, mut trace: Trace) -> Result<Recording, String> {
         let other = &mut trace.metadata.other;
         other.retain(|(key, _)| key != "made_by");
@@ -82,7 +82,7 @@ impl Files {
         Recording::of_trace(self.trace_name(), bytes).map_err(|error| error.to_string())
     }
 
-    /// The name that the command line proposes.
+    /// Returns the name that the command line proposes.
     pub(crate) fn trace_name(&self) -> &'static str {
         let is_taken = |name: &&str| self.files.iter().any(|(file, _)| file == name);
         let names = ["trace.csv", "imported.csv", "imported-trace.csv"];
@@ -90,16 +90,16 @@ impl Files {
     }
 }
 
-/// The bits of all its numbers.
+/// Returns the bits of all its numbers.
 fn numbers(trace: &Trace) -> impl Iterator<Item = u64> {
     let reference = trace.reference.iter().flat_map(|reference| &reference.values);
     trace.time_s.iter().chain(&trace.readings.values).chain(reference).map(|number| number.to_bits())
 }
 
-/// Bytes that tell what a file is.
+/// Number of first bytes by which the kind of a file is recognised.
 const HEAD: usize = 4096;
 
-/// Refuses what this program made of recordings, which looks like a table, too.
+/// Refuses results of this program, which look like tables, too.
 fn refuse_results(name: &str, bytes: &[u8]) -> Result<(), String> {
     let head = String::from_utf8_lossy(&bytes[..bytes.len().min(HEAD)]);
     let header = head.lines().next().unwrap_or_default();

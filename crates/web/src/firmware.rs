@@ -1,4 +1,4 @@
-//! A sensor's filter as source code for a microcontroller, and what it costs there.
+//! A sensor's filter as source code for a microcontroller, and its cost there.
 
 use ohmstrain::SensorParams;
 use ohmstrain_export::{Budget, Cost, ExportError, ExportTarget, Prefix};
@@ -21,12 +21,12 @@ struct Costs {
 
 #[wasm_bindgen]
 impl Firmware {
-    /// Paths and contents of its files, one after the other.
+    /// Returns paths and contents of its files, alternating.
     pub fn files(&self) -> Vec<String> {
         self.0.files.iter().flat_map(|file| [file.path.clone(), file.content.clone()]).collect()
     }
 
-    /// The table that `ohmstrain export` prints: what was promised, and what it costs.
+    /// Returns the table that `ohmstrain export` prints: promise and cost.
     pub fn lines(&self) -> Vec<String> {
         self.0.promise.lines.clone()
     }
@@ -37,7 +37,7 @@ impl Firmware {
         self.0.promise.words.clone()
     }
 
-    /// Instructions a step of a Cortex-M4F; flash, RAM, and of it stack, bytes. All are estimated.
+    /// Returns the estimated cost: instructions per step of a Cortex-M4F; flash, RAM and the stack's part of it, bytes.
     #[wasm_bindgen(unchecked_return_type = "Cost")]
     pub fn cost(&self) -> Result<JsValue, JsError> {
         let cost = self.0.promise.cost;
@@ -62,7 +62,7 @@ pub fn of(
     made.map(Firmware).map_err(|error| named(&error))
 }
 
-/// A refusal with the flag or the file that it is about.
+/// Adds to a refusal the flag or the file that it concerns.
 fn named(error: &ExportError) -> String {
     match error {
         ExportError::Unsupported { .. } | ExportError::Parameter(_) => format!("sensor.toml: {error}"),

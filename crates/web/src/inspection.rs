@@ -7,12 +7,12 @@ use wasm_bindgen::prelude::*;
 use crate::json::{json, refused};
 use crate::recording::Recording;
 
-/// An import that has been tried, and what came of it.
+/// An import that has been tried, and its result.
 pub struct Proposal {
     pub plan: Plan,
     pub imported: Imported,
     pub recording: Recording,
-    /// The file itself is a trace.
+    /// True if the file itself is a trace.
     pub is_trace: bool,
 }
 
@@ -28,7 +28,7 @@ pub struct Inspection {
 pub struct Asked {
     /// Question in one line, as on the command line.
     text: String,
-    /// Flags that answer it; none of what is no question.
+    /// Flags that answer it; empty for an error that is not a question.
     answers: Vec<String>,
 }
 
@@ -58,7 +58,7 @@ struct Described<'a> {
     files: Vec<DescribedFile<'a>>,
     question: Option<&'a Asked>,
     remarks: &'a [String],
-    /// Flags for all of the plan.
+    /// Flags that state the whole plan.
     flags: String,
     is_trace: bool,
     roles: Vec<DescribedRole>,
@@ -81,9 +81,9 @@ struct DescribedFile<'a> {
 struct DescribedColumn<'a> {
     heading: &'a str,
     unit: &'a str,
-    /// Role that was chosen for it, and its unit.
+    /// Its chosen role, and its unit.
     taken: Option<(&'static str, String)>,
-    /// Role that it may have.
+    /// Its possible role.
     candidate: Option<&'static str>,
     first: &'a str,
     last: &'a str,
@@ -91,7 +91,7 @@ struct DescribedColumn<'a> {
 
 #[wasm_bindgen]
 impl Inspection {
-    /// Files, columns and what they are taken for; the question, if there is one; remarks.
+    /// Describes the files, the roles of their columns, the question, if there is one, and remarks.
     #[wasm_bindgen(unchecked_return_type = "Described")]
     pub fn described(&self) -> Result<JsValue, JsError> {
         let proposal = self.found.as_ref().ok();
@@ -112,7 +112,7 @@ impl Inspection {
         json(&lines.unwrap_or_default())
     }
 
-    /// The recording.
+    /// Returns the recording.
     pub fn recording(&self) -> Result<Recording, JsError> {
         self.found.as_ref().map(|found| found.recording.clone()).map_err(|asked| refused(&asked.text))
     }
@@ -140,7 +140,7 @@ impl Inspection {
     }
 }
 
-/// The flags of a recipe on one line.
+/// Returns the flags of a recipe on one line.
 fn flags(recipe: &Recipe) -> String {
     let words = recipe.arguments();
     shlex::try_join(words.iter().map(String::as_str)).unwrap_or_default()

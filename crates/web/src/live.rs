@@ -19,7 +19,7 @@ pub struct Wishes {
 }
 
 impl Wishes {
-    /// Parses the options from an object, or from nothing.
+    /// Parses the options from an object; undefined gives the defaults.
     pub fn of(value: &JsValue) -> Result<Self, String> {
         if value.is_undefined() || value.is_null() {
             return Ok(Self::default());
@@ -58,14 +58,15 @@ impl Filter {
 
 #[wasm_bindgen]
 impl Filter {
-    /// Takes a reading, in the sensor's unit, at a time, s; NaN stands for a missing one. The estimate has the names of
+    /// Takes a reading, in the sensor's unit, at a time, s; a missing reading is NaN. The estimate has the names of
     /// `estimates.csv`. An error leaves the filter as it was.
     #[wasm_bindgen(unchecked_return_type = "Estimate")]
     pub fn step(&mut self, time_s: f64, reading: f64) -> Result<JsValue, JsError> {
         json(&self.filter.step(time_s, reading).map_err(refused)?)
     }
 
-    /// Takes many readings at once; the columns of their estimates, one after the other, in the order of the sensor's columns.
+    /// Takes many readings at once, and returns the columns of their estimates one after another, in the order of the sensor's
+    /// columns.
     #[wasm_bindgen(js_name = stepAll)]
     pub fn step_all(&mut self, time_s: &[f64], reading: &[f64]) -> Result<Vec<f64>, JsError> {
         let rows = time_s.iter().zip(reading).map(|(time_s, reading)| self.filter.step(*time_s, *reading));
@@ -73,7 +74,7 @@ impl Filter {
         Ok(self.columns.iter().flat_map(|column| rows.iter().map(|row| column.number(row))).collect())
     }
 
-    /// Takes a known strain, and its standard deviation: 0 at rest.
+    /// Takes a strain known now and its standard deviation; at rest the strain is 0.
     pub fn know(&mut self, strain: f64, sd: f64) -> Result<(), JsError> {
         self.filter.know(strain, sd).map(|_| ()).map_err(refused)
     }

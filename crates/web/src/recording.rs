@@ -1,4 +1,4 @@
-//! A recording as a calibration, a filter or a report takes it: a trace and the bytes of its file.
+//! A recording for calibration, filter or report: a trace and the bytes of its file.
 
 use ohmstrain::trace::TraceFile;
 use ohmstrain::{ReadingUnit, Sensor};
@@ -8,7 +8,7 @@ use wasm_bindgen::prelude::*;
 
 use crate::json::refused;
 
-/// A recording: times, readings and perhaps a reference, with the bytes of the trace CSV that they stand in.
+/// A recording: times, readings and optionally a reference, with the bytes of its trace CSV.
 #[wasm_bindgen]
 #[derive(Clone)]
 pub struct Recording {
@@ -25,7 +25,7 @@ impl Recording {
     }
 }
 
-/// The sensor as it sits in a recording.
+/// Mounts the sensor as a recording describes.
 pub(crate) fn seated(sensor: &Sensor, recording: &TraceFile) -> Result<Sensor, String> {
     recording.check_unit(sensor.params().reading).map_err(|error| error.to_string())?;
     let sensor = sensor.clone();
@@ -37,7 +37,7 @@ pub(crate) fn seated(sensor: &Sensor, recording: &TraceFile) -> Result<Sensor, S
 
 #[wasm_bindgen]
 impl Recording {
-    /// Times, s; readings, Ω; and, if they are known, strains. NaN stands for a missing reading or strain.
+    /// Creates a recording from times, s, readings, Ω, and, if they are known, strains. A missing reading or strain is NaN.
     #[wasm_bindgen(constructor)]
     pub fn new(time_s: &[f64], ohm: &[f64], strain: Option<Vec<f64>>) -> Result<Recording, JsError> {
         if ohm.len() != time_s.len() || strain.as_ref().is_some_and(|strain| strain.len() != time_s.len()) {
@@ -59,31 +59,31 @@ impl Recording {
         Self::of_trace(name, bytes).map_err(refused)
     }
 
-    /// Its name.
+    /// Returns its name.
     #[wasm_bindgen(getter)]
     pub fn name(&self) -> String {
         self.file.name.clone()
     }
 
-    /// Number of rows.
+    /// Returns the number of rows.
     #[wasm_bindgen(getter)]
     pub fn rows(&self) -> usize {
         self.file.trace.len()
     }
 
-    /// Times, s.
+    /// Returns the times, s.
     #[wasm_bindgen(getter)]
     pub fn time(&self) -> Vec<f64> {
         self.file.trace.time_s.clone()
     }
 
-    /// Readings, Ω or a ratio; NaN where missing.
+    /// Returns the readings, Ω or a ratio; NaN where missing.
     #[wasm_bindgen(getter)]
     pub fn reading(&self) -> Vec<f64> {
         self.file.trace.readings.values.clone()
     }
 
-    /// The reference, strain or degrees; NaN where missing.
+    /// Returns the reference, strain or degrees; NaN where missing.
     #[wasm_bindgen(getter)]
     pub fn reference(&self) -> Option<Vec<f64>> {
         self.file.trace.reference.as_ref().map(|reference| reference.values.clone())
@@ -95,18 +95,18 @@ impl Recording {
         self.file.quantity().map(|quantity| quantity.name().to_owned())
     }
 
-    /// Unit of the readings: `ohm` or `ratio`.
+    /// Returns the unit of the readings: `ohm` or `ratio`.
     #[wasm_bindgen(getter, js_name = unit)]
     pub fn unit_name(&self) -> String {
         if self.file.unit() == ReadingUnit::Ohm { "ohm".into() } else { "ratio".into() }
     }
 
-    /// Another handle for it: a calibration takes what it is given.
+    /// Returns another handle for it, since a calibration consumes its recordings.
     pub fn copy(&self) -> Recording {
         self.clone()
     }
 
-    /// The trace CSV.
+    /// Returns the trace CSV.
     pub fn csv(&self) -> Vec<u8> {
         self.bytes.clone()
     }

@@ -16,13 +16,13 @@ pub struct Drawn {
 
 #[wasm_bindgen]
 impl Drawn {
-    /// The report, one page of HTML with nothing outside of it.
+    /// Returns the report, one self-contained page of HTML.
     #[wasm_bindgen(getter)]
     pub fn html(&self) -> String {
         self.html.clone()
     }
 
-    /// Names and contents of the figures' files, one after the other.
+    /// Returns names and contents of the figures' files, alternating.
     pub fn figures(&self) -> Vec<String> {
         let files = |figure: &FigureFiles| {
             let name = &figure.name;
@@ -32,7 +32,7 @@ impl Drawn {
     }
 }
 
-/// Filters, smooths, scores and draws.
+/// Filters and smooths a recording, scores the estimates and draws the report.
 pub fn drawn(
     sensor: &Sensor,
     recording: &TraceFile,
@@ -94,7 +94,7 @@ pub fn drawn(
     Ok(Drawn { html: report.html().map_err(failed)?, figures: report.figures().map_err(failed)? })
 }
 
-/// Scores of all rows; `None` without a reference.
+/// Scores all rows; `None` without a reference.
 fn score(recording: &TraceFile, estimate: impl Fn(usize) -> (f64, Option<f64>)) -> Option<Scores> {
     let row = |k: usize| {
         let (strain, sd) = estimate(k);

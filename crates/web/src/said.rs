@@ -1,4 +1,4 @@
-//! Answers about files: the flags of `ohmstrain import`, as a shell takes them.
+//! Answers about files: the flags of `ohmstrain import` in the syntax of a shell.
 
 use std::fmt::Display;
 use std::str::FromStr;
@@ -52,7 +52,7 @@ fn say(recipe: &mut Recipe, flag: &str, value: &str) -> Result<(), String> {
     Ok(())
 }
 
-/// `ROLE=VALUE` taken apart.
+/// Splits `ROLE=VALUE`.
 fn of_role<T>(text: &str, value: impl FnOnce(&str) -> Result<T, String>) -> Result<(Role, T), String> {
     let (role, rest) = text.split_once('=').ok_or("expected ROLE=VALUE")?;
     Ok((role.parse()?, value(rest)?))
@@ -62,7 +62,7 @@ fn parsed<T: FromStr<Err: Display>>(text: &str) -> Result<T, String> {
     text.parse().map_err(|error: T::Err| format!("{error}, found `{text}`"))
 }
 
-/// A number of something that is counted from 1.
+/// Parses a number that counts from 1.
 fn counted(text: &str) -> Result<usize, String> {
     text.parse().ok().filter(|number| *number > 0).ok_or_else(|| format!("expected a number from 1 on, found `{text}`"))
 }

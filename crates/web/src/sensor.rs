@@ -13,12 +13,12 @@ use crate::recording::Recording;
 use crate::report::{self, Drawn};
 use crate::stream::Stream;
 
-/// A calibrated sensor: what a `sensor.toml` holds.
+/// A calibrated sensor: the content of a `sensor.toml`.
 #[wasm_bindgen]
 #[derive(Clone)]
 pub struct Sensor {
     sensor: ohmstrain::Sensor,
-    /// Facts about its calibration, if it was made here.
+    /// Facts about its calibration, if it was calibrated here.
     facts: Vec<(&'static str, String)>,
     tested: Option<Tested>,
 }
@@ -42,7 +42,7 @@ struct Described {
 
 #[wasm_bindgen]
 impl Sensor {
-    /// Reads a `sensor.toml`; `name` is what messages call it.
+    /// Reads a `sensor.toml`; `name` is its name in messages.
     #[wasm_bindgen(js_name = fromToml)]
     pub fn from_toml(text: &str, name: Option<String>) -> Result<Sensor, JsError> {
         let name = name.unwrap_or_else(|| "sensor.toml".into());
@@ -50,7 +50,7 @@ impl Sensor {
         Ok(Self::new(sensor, vec![], None))
     }
 
-    /// Its `sensor.toml`.
+    /// Returns its `sensor.toml`.
     #[wasm_bindgen(js_name = toToml)]
     pub fn to_toml(&self) -> Result<String, JsError> {
         self.sensor.to_toml().map_err(|error| refused(format!("cannot write parameters: {error}")))
@@ -73,7 +73,7 @@ impl Sensor {
         })
     }
 
-    /// A filter that takes readings as they come.
+    /// Creates a filter for live readings.
     pub fn filter(
         &self,
         #[wasm_bindgen(unchecked_param_type = "Wishes | undefined")] wishes: JsValue,
@@ -81,7 +81,7 @@ impl Sensor {
         Wishes::of(&wishes).and_then(|wishes| Filter::new(&self.sensor, &wishes)).map_err(refused)
     }
 
-    /// A filter for the lines of a board: without `header` they bring one. See [`Stream`].
+    /// Creates a filter for the lines of a board; without `header`, the board sends one. See [`Stream`].
     pub fn stream(&self, header: Option<String>, front_end: Option<String>) -> Result<Stream, JsError> {
         Stream::new(&self.sensor, header.as_deref(), front_end.as_deref()).map_err(refused)
     }
@@ -98,13 +98,13 @@ impl Sensor {
         estimates::smoothed(&self.sensor, &recording.file).map_err(refused)
     }
 
-    /// The report on a recording, and its figures.
+    /// Draws the report on a recording, with its figures.
     pub fn report(&self, recording: &Recording) -> Result<Drawn, JsError> {
         report::drawn(&self.sensor, &recording.file, &self.facts, self.tested.as_ref()).map_err(refused)
     }
 
-    /// Its filter as source code for a microcontroller, as `ohmstrain export` writes it. `target` is `c` or `rust`, `budget` is
-    /// that of `--budget`; without one all of the filter is exported.
+    /// Exports its filter as source code for a microcontroller, as `ohmstrain export` writes it. `target` is `c` or `rust`,
+    /// `budget` is that of `--budget`; without one, the whole filter is exported.
     pub fn firmware(
         &self,
         target: &str,

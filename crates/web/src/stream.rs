@@ -1,4 +1,4 @@
-//! A board that sends lines: what `ohmstrain live` makes of them.
+//! Filtering of a board's lines, as in `ohmstrain live`.
 
 use std::collections::VecDeque;
 
@@ -11,17 +11,17 @@ use wasm_bindgen::prelude::*;
 use crate::json::{json, refused};
 use crate::stream_lines::Lines;
 
-/// Readings of the last seconds, and how many, that tell what the rested sensor reads.
+/// Duration, s, over which the reading of the rested sensor is determined, and the smallest number of readings for that.
 const REST_S: f64 = 1.0;
 const LEAST_AT_REST: usize = 5;
-/// Standard deviation of a known rest, in spans of the limits: that of a known strain on the command line.
+/// Standard deviation of a known rest, as a share of the limits' span: that of a known strain on the command line.
 const KNOWN_TO: f64 = 0.005;
-/// Readings that are looked at before their unit is doubted.
+/// Number of readings after which their unit is checked.
 const FIRST_READINGS: usize = 20;
-/// Numbers of a row that is handed over.
+/// Numbers per row that are returned.
 const WIDTH: usize = 4;
 
-/// Lines of a board, or of a recording that is played, through a sensor's filter.
+/// Filter for the lines of a board, or of a recording that is played back.
 #[wasm_bindgen]
 pub struct Stream {
     sensor: Sensor,
@@ -38,7 +38,7 @@ pub struct Stream {
     record: Vec<u8>,
 }
 
-/// Counts of what has come.
+/// Counts of rows, gaps, bad lines and the like.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 struct Counts {
     rows: u64,
@@ -53,14 +53,14 @@ struct Counts {
 struct Described<'a> {
     counts: Counts,
     message: &'a str,
-    /// Columns that were found; none before a header.
+    /// Columns of the header; empty before one has arrived.
     columns: Vec<&'static str>,
     metadata: String,
 }
 
 impl Stream {
-    /// Waits for a header, unless `header` names the columns: those of a trace, or `time_ms`; without a time, rows have the time
-    /// at which they arrive. `front_end` describes the electronics of converter codes.
+    /// Creates a stream that waits for a header, unless `header` names the columns: those of a trace, or `time_ms`; without a
+    /// time, rows get their time of arrival. `front_end` describes the electronics of converter codes.
     pub(crate) fn new(sensor: &Sensor, header: Option<&str>, front_end: Option<&str>) -> Result<Self, String> {
         let mut overrides = Metadata::default();
         if let Some(text) = front_end.filter(|text| !text.is_empty()) {
@@ -88,7 +88,7 @@ impl Stream {
         Ok(stream)
     }
 
-    /// Takes a line without its end; numbers of its row are appended to `out`.
+    /// Takes a line without its end, and appends the numbers of its row to `out`.
     fn take_line(&mut self, line: &str, arrived_s: f64, out: &mut Vec<f64>) -> Result<(), String> {
         match self.lines.take(line, arrived_s) {
             Ok(Line::Row(row)) => self.take_row(&row, out),
@@ -106,7 +106,7 @@ impl Stream {
         }
     }
 
-    /// A header has come: another stream begins.
+    /// Begins another stream after a header.
     fn headed(&mut self) -> Result<(), String> {
         let (found, expected) = (self.reading_column(), self.sensor.columns()[1].name());
         let is_ratio = found == "resistance_ratio";
@@ -119,7 +119,7 @@ impl Stream {
         if self.counts.rows > 0 { self.restart() } else { Ok(()) }
     }
 
-    /// The clock has started again: so does everything that has times.
+    /// Restarts everything that depends on time, after the clock has restarted.
     fn restart(&mut self) -> Result<(), String> {
         self.counts.restarts += 1;
         self.begin(false)?;
@@ -127,11 +127,11 @@ impl Stream {
         Ok(())
     }
 
-    /// A fresh filter.
+    /// Starts a new filter.
     fn begin(&mut self, at_zero: bool) -> Result<(), String> {
         let builder = self.sensor.filter();
         let builder = self.rest.map_or(builder, |measured| builder.rest_resistance(measured));
-        // A sensor that is always stretched somewhat cannot start at zero.
+        // A sensor whose range excludes zero cannot start there.
         let zero = at_zero.then(|| builder.initial_strain(0.0).build().ok()).flatten();
         self.filter = zero.map_or_else(|| builder.build(), Ok).map_err(|error| error.to_string())?;
         self.watch = ValidityWatch::new(&self.sensor, self.rest);
@@ -172,7 +172,7 @@ impl Stream {
         Ok(())
     }
 
-    /// Doubts the unit of the readings, once there are enough.
+    /// Checks the unit of the readings, once there are enough.
     fn doubt_early(&mut self, value: f64) {
         if !value.is_finite() || self.early.len() >= FIRST_READINGS {
             return;
@@ -200,7 +200,7 @@ impl Stream {
         })
     }
 
-    /// The columns of the record; none before a header.
+    /// Returns the columns of the record; empty before a header.
     fn columns(&self) -> Vec<&'static str> {
         if self.lines.parser.reading_kind().is_none() {
             return vec![];
@@ -223,8 +223,8 @@ impl Stream {
 
 #[wasm_bindgen]
 impl Stream {
-    /// Takes whole lines that have arrived at a time, s, of this computer's clock; of each row four numbers: time in s, reading,
-    /// strain and its standard deviation.
+    /// Takes complete lines that have arrived at a time, s, on this computer's clock. Returns four numbers per row: time in s,
+    /// reading, strain and its standard deviation.
     pub fn take(&mut self, text: &str, arrived_s: f64) -> Result<Vec<f64>, JsError> {
         let mut out = Vec::with_capacity(WIDTH * text.len() / 8);
         for line in text.lines() {
@@ -242,7 +242,7 @@ impl Stream {
         json(&Described { counts: self.counts, message: &self.message, columns: self.columns(), metadata })
     }
 
-    /// The sensor is at rest, unstretched: the strain is zero now.
+    /// Takes the sensor as rested and unstretched now: the strain is zero.
     pub fn rest(&mut self) -> Result<(), JsError> {
         let sd = KNOWN_TO * self.sensor.params().limits.span();
         self.filter.know(0.0, sd).map_err(refused)?;
@@ -250,7 +250,7 @@ impl Stream {
         Ok(())
     }
 
-    /// The sensor is at rest: what it reads now is R₀, and the strain starts again at zero.
+    /// Takes the sensor as rested now: its reading becomes R₀, and the strain starts again at zero.
     pub fn zero(&mut self) -> Result<(), JsError> {
         let mut readings: Vec<f64> =
             self.recent.iter().map(|(_, reading)| *reading).filter(|reading| reading.is_finite()).collect();

@@ -1,28 +1,28 @@
-//! Lines of a board as those of a trace: times that they have not, or have in milliseconds.
+//! Lines of a board in the form of a trace: missing times are added, milliseconds become seconds.
 
 use ohmstrain_bench_data::{BadContent, Line, LineParser};
 
-/// Between lines that arrive at once, s: two digits above what is written.
+/// Interval between lines that arrive at once, s: a hundred times the resolution of the written times.
 const LEAST_STEP_S: f64 = 1e-4;
 
 /// Source of the lines' times.
 enum Clock {
     /// Times in the lines themselves.
     Own,
-    /// A cell of the lines counts milliseconds.
+    /// A cell of milliseconds in each line, by its index.
     Milliseconds(usize),
-    /// They arrive then: the first time, and the last one since, s.
+    /// Arrival of the lines: the first time, and the last time since then, s.
     Arrival(Option<f64>, f64),
 }
 
-/// Takes lines.
+/// Parser of lines.
 pub struct Lines {
     pub parser: LineParser,
     clock: Clock,
 }
 
 impl Lines {
-    /// Waits for a header unless one is given.
+    /// Creates a parser that waits for a header, unless one is given.
     pub fn new(mut parser: LineParser, header: Option<&str>) -> Result<Self, String> {
         let Some(header) = header else { return Ok(Self { parser, clock: Clock::Own }) };
         let names: Vec<&str> = header.split(',').map(str::trim).collect();
@@ -62,7 +62,7 @@ impl Lines {
     }
 }
 
-/// The line with a cell of milliseconds in seconds; as it is if that is no number.
+/// Converts a cell of milliseconds to seconds; the line stays as it is if the cell is not a number.
 fn with_seconds(line: &str, place: usize) -> String {
     let seconds = |cell: &str| cell.trim().parse().map_or_else(|_| cell.to_owned(), |ms: f64| (ms / 1e3).to_string());
     let cells = line.split(',').enumerate();

@@ -1,4 +1,4 @@
-//! One interface over the filters that are measured.
+//! A common interface of the measured filters.
 
 use core::hint::black_box;
 
@@ -12,19 +12,19 @@ use crate::{DT_S, limits, sensor};
 
 /// A filter with its state.
 pub trait Filter<T>: Copy {
-    /// The filter before any reading.
+    /// Creates the filter before any reading.
     ///
     /// # Errors
     /// None: the parameters are valid.
     fn start() -> Result<Self, ParameterError>;
 
-    /// Takes the next reading; whether the step went well.
+    /// Takes the next reading; returns true if the step succeeded.
     fn step(&mut self, reading: Reading<T>) -> bool;
 
-    /// Mean strain.
+    /// Returns the mean strain.
     fn strain(&self) -> T;
 
-    /// Bytes that change from step to step.
+    /// Returns the size of the state that changes from step to step, bytes.
     fn state_bytes() -> usize;
 }
 
@@ -43,7 +43,7 @@ pub type Ekf6<T> = PreparedEkf<T, 3, 6, 21>;
 
 impl<T: Scalar, const B: usize, const N: usize, const L: usize> Filter<T> for PreparedEkf<T, B, N, L> {
     fn start() -> Result<Self, ParameterError> {
-        // Parameters come from a file in the field: the compiler must not compute with them.
+        // In the field, parameters come from a file, so the compiler must not compute with them.
         let model = black_box(sensor()?);
         Ok(Self { prepared: model.prepare(T::of(DT_S)), belief: Belief::initial(&model), ekf: Ekf::new(model) })
     }
@@ -67,7 +67,7 @@ impl<T: Scalar, const B: usize, const N: usize, const L: usize> Filter<T> for Pr
     }
 }
 
-/// The EKF of three states with a step length that changes from reading to reading.
+/// The EKF of three states with a step length that varies from reading to reading.
 #[derive(Clone, Copy)]
 pub struct VaryingEkf3<T> {
     ekf: Ekf<SwitchedModel<T, 1, 3>>,
@@ -108,14 +108,14 @@ fn evidence<T: Scalar>() -> Evidence<T> {
     Evidence { limits: limits(), tempering: T::one() }
 }
 
-/// A filter of the sensor's own model that leaves out the zeros, at a fixed rate, and its state, which changes in place.
+/// A sparse filter of the sensor's own model at a fixed rate, with its state, which changes in place.
 #[derive(Clone, Copy)]
 pub struct Fast<F, S> {
     filter: F,
     state: S,
 }
 
-/// The EKF that leaves out the zeros, with the unit's square root and a gauge that is a polynomial.
+/// The sparse EKF, with the floating-point unit's square root and a polynomial gauge.
 type Kernel<T, const B: usize, const N: usize> = SparseEkf<T, OnFpu, B, N, Cubic<T>>;
 type FastImm<T, const B: usize, const N: usize> = Imm<T, B, N, OnFpu, Cubic<T>>;
 type FastSplit<T, const B: usize, const N: usize, const K: usize> = SignSplit<T, B, N, K, OnFpu, Cubic<T>>;
@@ -124,9 +124,9 @@ type FastSplit<T, const B: usize, const N: usize, const K: usize> = SignSplit<T,
 pub type Fast3<T> = Fast<Kernel<T, 1, 3>, Belief<T, 3, 6>>;
 /// Strain, rate, three branches, baseline.
 pub type Fast6<T> = Fast<Kernel<T, 3, 6>, Belief<T, 6, 21>>;
-/// Three phases of those six states.
+/// Three phases with these six states.
 pub type FastImm6<T> = Fast<FastImm<T, 3, 6>, PhaseMixture<T, 6, 21>>;
-/// Four hypotheses of them, split by the sign of the rate.
+/// Four hypotheses with these six states, split by the sign of the rate.
 pub type FastSplit6<T> = Fast<FastSplit<T, 3, 6, 4>, Mixture<T, 6, 21, 4>>;
 
 fn kernel<T: Scalar, const B: usize, const N: usize>() -> Result<Kernel<T, B, N>, ParameterError>
@@ -136,7 +136,7 @@ where
     SparseEkf::new(black_box(sensor()?), T::of(DT_S)).map_err(|_| ParameterError::new("dt_s", Problem::NotPositive))
 }
 
-/// [`Filter`] for these: they differ in how they start and where they keep the strain.
+/// Implements [`Filter`] for these; they differ in their start and in the place of the strain.
 macro_rules! fast_filter {
     (
         <T: $scalar:ident $(, const $n:ident)*> $filter:ty, $state:ty,
@@ -190,7 +190,7 @@ fast_filter!(
     |mixture| mixture.marginal(0).mean
 );
 
-/// The EKF of three states that leaves out the zeros, asked for its step length at every reading.
+/// The sparse EKF of three states with a step length given at every reading.
 #[derive(Clone, Copy)]
 pub struct VaryingFast3<T: Scalar> {
     fast: Fast3<T>,

@@ -1,10 +1,10 @@
-//! The square root of the floating-point unit, which Rust's core does not reach on stable.
+//! Square root by the floating-point unit, which Rust's `core` does not offer on stable.
 
 use ohmstrain_ekf::{Compact, CompactWidth, Switch};
 use ohmstrain_model::SplitRate;
 
 /// [`Compact`] with square roots by `vsqrt`: a few instructions instead of a routine with a table. Both round correctly, so the
-/// result is the same.
+/// results are equal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OnFpu;
 
@@ -29,7 +29,7 @@ impl Switch<f32> for OnFpu {
     }
 }
 
-/// The reference on the host.
+/// Reference on the host.
 impl Switch<f64> for OnFpu {
     const CLEAR: f64 = <Compact as Switch<f64>>::CLEAR;
 
@@ -48,8 +48,8 @@ impl Switch<f64> for OnFpu {
 #[inline(always)]
 fn root(square: f32) -> f32 {
     let mut bits = square.to_bits();
-    // SAFETY: leaves every register and the stack as they were, except `bits`. Stable Rust does not let a register of the
-    // unit be named, so one is saved and restored.
+    // SAFETY: leaves every register and the stack as they were, except `bits`. Stable Rust cannot name a register of the unit,
+    // so one is saved and restored.
     unsafe {
         core::arch::asm!(
             "vpush {{s0}}",

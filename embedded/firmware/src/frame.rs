@@ -1,8 +1,8 @@
-//! Frame that runs a filter on the target and measures it. Everything is reported as little-endian words on the host's
-//! standard output: formatting numbers would bring code, and panics, that are no part of the filter.
+//! Harness that runs a filter on the target and measures it. All results are little-endian words on the host's standard output:
+//! formatting numbers would add code, and panics, that do not belong to the filter.
 //!
-//! Words: codes, instructions of all steps, of the dearest step, of the conversion of all codes, worst stack of a step in
-//! bytes, bytes of state, readings refused; then the strain after every reading as `f32` bits.
+//! Words: number of codes; instructions of all steps, of the most expensive step, of the conversion of all codes; worst stack
+//! of a step, bytes; size of the state, bytes; number of refused readings; then the strain after every reading as `f32` bits.
 
 use core::hint::black_box;
 use core::panic::PanicInfo;
@@ -19,20 +19,20 @@ use crate::{Filter, front_end, to_reading};
 /// timer has 25 MHz.
 const PER_TICK: u32 = 40;
 
-/// Repeating a step as often as there are instructions in a tick counts it to one instruction.
+/// Number of repetitions of a step; with as many as a tick has instructions, the count is exact to one instruction.
 const REPEATS: u32 = PER_TICK;
 
-/// Bytes of stack that are watched.
+/// Bytes of stack that are observed.
 const WATCHED: u32 = 24 * 1024;
 const PAINT: u32 = 0x5AFE_C0DE;
 
-/// The code under test, and nothing else, in one symbol that a disassembly finds.
+/// Runs the code under test alone, in one symbol that the disassembly contains.
 #[inline(never)]
 pub fn filter_step<F: Filter<f32>>(filter: &mut F, reading: Reading<f32>) -> bool {
     filter.step(reading)
 }
 
-/// Runs a filter over recorded codes, reports, and ends the program.
+/// Runs a filter over recorded codes, reports the results, and ends the program.
 pub fn run<F: Filter<f32>, const K: usize>(codes: &[u16; K]) -> ! {
     match measure::<F, K>(codes) {
         Some(()) => debug::exit(EXIT_SUCCESS),
@@ -76,7 +76,7 @@ fn measure<F: Filter<f32>, const K: usize>(codes: &[u16; K]) -> Option<()> {
     Some(())
 }
 
-/// Instructions of one pass over the readings, the loop included.
+/// Counts the instructions of one pass over the readings, loop included.
 #[inline(never)]
 fn all_steps<F: Filter<f32>>(mut filter: F, readings: &[Reading<f32>]) -> u32 {
     let start = SYST::get_current();
@@ -86,7 +86,7 @@ fn all_steps<F: Filter<f32>>(mut filter: F, readings: &[Reading<f32>]) -> u32 {
     since(start)
 }
 
-/// Instructions of the dearest step, without copying the filter back to before it.
+/// Counts the instructions of the most expensive step, without those for copying the filter back to its state before the step.
 #[inline(never)]
 fn dearest_step<F: Filter<f32>>(mut filter: F, readings: &[Reading<f32>]) -> u32 {
     let mut dearest = 0;
@@ -102,13 +102,13 @@ fn dearest_step<F: Filter<f32>>(mut filter: F, readings: &[Reading<f32>]) -> u32
     dearest
 }
 
-/// Never inlined: it shall cost the same wherever it is called.
+/// Copies a filter; never inlined, so that it costs the same everywhere.
 #[inline(never)]
 fn copy<F: Copy>(from: &F, to: &mut F) {
     *to = black_box(*from);
 }
 
-/// Instructions of one out of many equal calls.
+/// Counts the instructions of one of many equal calls.
 #[inline(always)]
 fn repeated(mut action: impl FnMut()) -> u32 {
     let start = SYST::get_current();
@@ -118,18 +118,19 @@ fn repeated(mut action: impl FnMut()) -> u32 {
     since(start) / REPEATS
 }
 
-/// Instructions since the timer, which counts down, showed `start`.
+/// Returns the number of instructions since the timer, which counts down, showed `start`.
 fn since(start: u32) -> u32 {
     (start.wrapping_sub(SYST::get_current()) & 0x00FF_FFFF) * PER_TICK
 }
 
-/// Bytes of stack that a step takes, found by painting the stack below this function.
+/// Returns the stack of a step, bytes, found by painting the stack below this function.
 #[inline(never)]
 fn worst_stack<F: Filter<f32>>(mut filter: F, readings: &[Reading<f32>]) -> u32 {
     let top = msp::read();
     let watched = (top - WATCHED..top).step_by(4);
     for address in watched.clone() {
-        // SAFETY: below the stack pointer, above the statics (the linker script leaves more than WATCHED): nobody's.
+        // SAFETY: below the stack pointer and above the statics (the linker script leaves more than WATCHED), so the memory is
+        // unused.
         unsafe { core::ptr::write_volatile(address as *mut u32, PAINT) };
     }
     for reading in readings {
@@ -146,7 +147,7 @@ fn halt() -> ! {
     }
 }
 
-/// Never linked: the check on the finished program refuses a panic that can be reached.
+/// Never linked: the check of the finished program refuses a reachable panic.
 #[panic_handler]
 fn panic(_: &PanicInfo<'_>) -> ! {
     debug::exit(EXIT_FAILURE);

@@ -1,7 +1,7 @@
-//! Converter code → ohm → filter → strain, as a microcontroller runs it.
+//! Converter code → ohm → filter → strain, as on a microcontroller.
 //!
-//! The filters are generic over the scalar: `f32` on the target, `f64` on the host, where the reference comes from.
-//! Each program in `src/bin` runs one of them over the same recorded codes and reports what that cost.
+//! The filters are generic over the scalar: `f32` on the target, `f64` on the host, which computes the reference. Each program
+//! in `src/bin` runs one of them over the same recorded codes and reports its cost.
 #![no_std]
 
 mod codes;

@@ -1,4 +1,4 @@
-//! The sensor that all filters here run on, and the electronics in front of it. Illustrative numbers.
+//! The sensor of all filters here, and the electronics in front of it. Their numbers are illustrative.
 
 use ohmstrain_ekf::Reading;
 use ohmstrain_model::{
@@ -12,13 +12,13 @@ pub const DT_S: f64 = 0.01;
 /// Resistance at rest, Ω.
 pub const REST_OHM: f64 = 5500.0;
 
-/// Strains for which the law holds.
+/// Returns the range of strains for which the law holds.
 #[must_use]
 pub fn limits<T: Scalar>() -> StrainRange<T> {
     StrainRange { lower: T::of(-0.02), upper: T::of(0.35) }
 }
 
-/// A sensor with up to three branches that share what relaxes, and a baseline if `N = B + 3`.
+/// Returns a sensor with up to three branches that share the relaxation, and a baseline if `N = B + 3`.
 ///
 /// # Errors
 /// None: the parameters are valid.
@@ -51,7 +51,7 @@ pub fn sensor<T: Scalar, const B: usize, const N: usize>() -> Result<SwitchedMod
     SwitchedModel::new(law, motion, noise)
 }
 
-/// A 12-bit divider with 10 kΩ above the sensor and one code of noise.
+/// Returns a 12-bit divider with 10 kΩ above the sensor and noise of one code.
 ///
 /// # Errors
 /// None: the parameters are valid.

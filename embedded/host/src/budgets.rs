@@ -1,4 +1,4 @@
-//! Committed figures, and what may be above them.
+//! Committed figures, and their tolerances.
 
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -6,26 +6,26 @@ use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 
-/// Growth of a count that is let pass with the compiler that the figures were measured with.
+/// Tolerated growth of a count with the compiler that the figures were measured with.
 const ROOM: f64 = 1.05;
-/// Growth of a count that is let pass with any other.
+/// Tolerated growth of a count with any other compiler.
 const ROOM_OTHER_COMPILER: f64 = 1.25;
-/// Growth of an error of the strain that is let pass: rounding in `f32` is the program's, not the compiler's.
+/// Tolerated growth of an error of the strain: rounding in `f32` depends on the program, not on the compiler.
 const ROOM_OF_ERRORS: f64 = 1.05;
-/// Separates rule and aims, which people write, from the figures, which `--update` writes.
+/// Line between rules and aims, which people write, and the figures, which `--update` writes.
 const FIGURES: &str = "# Measured; written by `run.sh --update`.\n";
 
 /// Figures of one program by name.
 pub type Figures = BTreeMap<&'static str, f64>;
 
-/// The committed figures and aims of all programs, and the compiler that the figures belong to.
+/// The committed figures and aims of all programs, and the compiler of the figures.
 pub struct Budgets {
     table: toml::Table,
     same_compiler: bool,
 }
 
 impl Budgets {
-    /// Reads `budgets.toml` for programs made by `compiler`.
+    /// Reads `budgets.toml` for programs built by `compiler`.
     pub fn read(path: &Path, compiler: &str) -> Result<Self, Box<dyn Error>> {
         Self::new(fs::read_to_string(path)?.parse()?, compiler)
     }
@@ -36,7 +36,7 @@ impl Budgets {
         Ok(Self { table, same_compiler })
     }
 
-    /// True if the programs were made by the compiler that the figures belong to.
+    /// True if the programs were built by the compiler of the figures.
     pub fn same_compiler(&self) -> bool {
         self.same_compiler
     }
@@ -51,24 +51,24 @@ impl Budgets {
         self.number("aim", program, figure)
     }
 
-    /// Returns the factor by which a figure may be above the committed one.
+    /// Returns the factor by which a figure may exceed the committed one.
     fn room(&self, figure: &str) -> f64 {
         match figure {
             "state_bytes" => 1.0,
             "strain_difference" | "strain_rms_error" => ROOM_OF_ERRORS,
-            // A budget of no panic leaves room for none.
+            // A budget without panics leaves no room.
             _ if self.same_compiler => ROOM,
             _ => ROOM_OTHER_COMPILER,
         }
     }
 
-    /// Lists every figure above its budget, or without one, in words.
+    /// Lists, in words, every figure above its budget or without one.
     pub fn broken(&self, program: &str, figures: &Figures) -> Vec<String> {
         let mut broken = Vec::new();
         for (figure, value) in figures {
             let room = self.room(figure);
             match self.number("measured", program, figure) {
-                // Written so that a NaN breaks its limit.
+                // Written so that NaN exceeds its limit.
                 Some(budget) if *value <= budget * room => {}
                 Some(budget) => broken.push(format!(
                     "{program}: {figure} is {value}, more than {:.0} % above its budget {budget}",
@@ -80,7 +80,7 @@ impl Budgets {
         broken
     }
 
-    /// Figures so far below their budgets that they should be committed, in words.
+    /// Lists, in words, figures so far below their budgets that they should be committed.
     pub fn cheaper(&self, program: &str, figures: &Figures) -> Vec<String> {
         let budget = |figure| self.number("measured", program, figure).filter(|_| self.same_compiler);
         figures
@@ -92,7 +92,7 @@ impl Budgets {
     }
 }
 
-/// Writes figures below rule and aims.
+/// Writes the figures below rules and aims.
 pub fn write(path: &Path, compiler: &str, programs: &[(&str, Figures)]) -> Result<(), Box<dyn Error>> {
     let old = fs::read_to_string(path)?;
     let (rule, _) = old.split_once(FIGURES).ok_or("budgets.toml has no line that says where figures begin")?;
@@ -114,7 +114,7 @@ pub fn write(path: &Path, compiler: &str, programs: &[(&str, Figures)]) -> Resul
 mod tests {
     use super::{Budgets, Figures};
 
-    /// Returns the number of these figures that are too large for a program made by `compiler`.
+    /// Returns how many of these figures are too large for a program built by `compiler`.
     fn broken(compiler: &str, figures: &[(&'static str, f64)]) -> usize {
         let budgets = "[measured]\ncompiler = \"ours\"\n[measured.ekf]\ninstructions = 1000\npanics = 0\n\
                        state_bytes = 36\nstrain_difference = 1e-6\n";

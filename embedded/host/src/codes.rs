@@ -1,16 +1,16 @@
-//! Codes of a 12-bit converter in front of simulated sensors that obey the laws the filters assume: one with a single
-//! branch for the filters of three states, one with three for those of six.
+//! Codes of a 12-bit converter in front of simulated sensors that obey the laws of the filters: one with a single branch for
+//! the filters of three states, one with three branches for those of six.
 
 use ohmstrain_firmware::{DT_S, REST_OHM, front_end, sensor};
 use ohmstrain_model::{ParameterError, Phase};
 
-/// Readings: six seconds.
+/// Number of readings: six seconds.
 pub const READINGS: usize = 600;
 
 /// Seed of the converter's noise.
 pub const SEED: u64 = 20_240_611;
 
-/// Substeps of one reading for the law's differential equation.
+/// Substeps per reading for the law's differential equation.
 const SUBSTEPS: usize = 20;
 
 /// Returns the strain of the body: rest, a cycle of 4 s to 15 % and back, a ramp to 10 % and a hold.
@@ -23,12 +23,12 @@ fn strain(time_s: f64) -> f64 {
     }
 }
 
-/// The strain at every reading.
+/// Returns the strain at every reading.
 pub fn strains() -> Vec<f64> {
     (1..=READINGS).map(|k| strain(k as f64 * DT_S)).collect()
 }
 
-/// The converter's codes for a sensor with `B` branches.
+/// Returns the converter's codes for a sensor with `B` branches.
 pub fn codes<const B: usize, const N: usize>() -> Result<Vec<u16>, ParameterError> {
     let model = sensor::<f64, B, N>()?;
     let (law, divider, mut noise) = (model.law(), front_end::<f64>()?, Noise(SEED));
@@ -59,7 +59,7 @@ pub fn codes<const B: usize, const N: usize>() -> Result<Vec<u16>, ParameterErro
     Ok(codes)
 }
 
-/// Noise of one code: Knuth's MMIX generator, twelve uniform numbers summed, which is as good as normal here.
+/// Noise of one code: Knuth's MMIX generator; a sum of twelve uniform numbers is close enough to normal here.
 struct Noise(u64);
 
 impl Noise {

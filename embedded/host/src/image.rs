@@ -5,19 +5,19 @@ use std::error::Error;
 use std::fs;
 use std::path::Path;
 
-/// Sizes, and call sites of what must not be called.
+/// Sizes, and call sites of forbidden functions.
 pub struct Image {
     /// Bytes of all functions that a step can reach, the step included.
     pub step_code: u64,
-    /// Bytes of read-only data, the replayed codes apart.
+    /// Bytes of read-only data, without the replayed codes.
     pub read_only: u64,
-    /// Routines of double precision in software.
+    /// Software routines for double precision.
     pub soft_double: Vec<String>,
     /// Symbols of a heap.
     pub heap: Vec<String>,
-    /// Calls of panics.
+    /// Number of calls of panics.
     pub panics: usize,
-    /// Calls through pointers in what a step can reach: its code would be larger than counted.
+    /// Number of calls through pointers that a step can reach: its code would be larger than counted.
     pub indirect: usize,
 }
 
@@ -27,7 +27,7 @@ struct Function {
 }
 
 impl Image {
-    /// Reads what `arm-none-eabi-nm -S`, `-objdump -d` and `-size -A` said of a program.
+    /// Reads the output of `arm-none-eabi-nm -S`, `-objdump -d` and `-size -A` for a program.
     pub fn read(stem: &Path) -> Result<Self, Box<dyn Error>> {
         let text = |extension: &str| fs::read_to_string(stem.with_extension(extension));
         let (functions, codes) = symbols(&text("nm")?)?;
@@ -57,7 +57,7 @@ impl Image {
     }
 }
 
-/// Functions by address, and the size of the replayed codes.
+/// Returns functions by address, and the size of the replayed codes.
 fn symbols(nm: &str) -> Result<(BTreeMap<u64, Function>, u64), Box<dyn Error>> {
     let (mut functions, mut codes) = (BTreeMap::new(), 0);
     for line in nm.lines() {
@@ -66,7 +66,7 @@ fn symbols(nm: &str) -> Result<(BTreeMap<u64, Function>, u64), Box<dyn Error>> {
         let size = u64::from_str_radix(size, 16)?;
         match *kind {
             "t" | "T" | "w" | "W" => {
-                // The lowest bit says "Thumb".
+                // The lowest bit marks Thumb code.
                 let address = u64::from_str_radix(address, 16)? & !1;
                 functions.insert(address, Function { name: (*name).into(), size });
             }
@@ -77,7 +77,7 @@ fn symbols(nm: &str) -> Result<(BTreeMap<u64, Function>, u64), Box<dyn Error>> {
     Ok((functions, codes))
 }
 
-/// Returns the calls between functions, every call site once, by address; and the functions that call through a pointer.
+/// Returns the calls between functions by address, one per call site; and the functions that call through a pointer.
 fn calls(disassembly: &str, functions: &BTreeMap<u64, Function>) -> (BTreeMap<u64, Vec<u64>>, Vec<u64>) {
     let (mut calls, mut indirect) = (BTreeMap::<u64, Vec<u64>>::new(), Vec::new());
     for line in disassembly.lines() {
@@ -104,7 +104,7 @@ fn hex(text: &str) -> Option<u64> {
     u64::from_str_radix(text, 16).ok()
 }
 
-/// The function around an address.
+/// Returns the function around an address.
 fn inside(functions: &BTreeMap<u64, Function>, address: u64) -> Option<u64> {
     let (start, function) = functions.range(..=address).next_back()?;
     (address < start + function.size).then_some(*start)
@@ -125,7 +125,7 @@ fn reached(
     Ok(reached)
 }
 
-/// Run-time routines of the ARM ABI and of the compiler that compute in `f64`.
+/// True for run-time routines of the ARM ABI and of the compiler that compute in `f64`.
 fn is_soft_double(name: &str) -> bool {
     let arm = ["__aeabi_d", "__aeabi_cd", "__aeabi_i2d", "__aeabi_ui2d", "__aeabi_l2d", "__aeabi_ul2d", "__aeabi_f2d"];
     let compiler = ["df2", "df3", "sfdf2", "dfsf2", "sidf", "dfsi", "didf", "dfdi"];

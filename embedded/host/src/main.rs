@@ -1,5 +1,5 @@
-//! `vectors`: the codes that the firmware replays and the strains that the filters make of them in double precision.
-//! `report`: what the firmware measured, compared with them and with the budgets.
+//! `vectors`: the codes that the firmware replays, and the strains that the filters compute from them in double precision.
+//! `report`: the firmware's measurements, compared with these and with the budgets.
 
 mod budgets;
 mod codes;

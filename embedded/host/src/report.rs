@@ -10,19 +10,19 @@ use crate::image::Image;
 use crate::run::Run;
 use crate::vectors::{PROGRAMS, TRUTH, column};
 
-/// One program as it was measured: built for speed and for size.
+/// Measurements of one program, built for speed and for size.
 struct Measured {
     name: &'static str,
     fast: (Run, Image),
     small: (Run, Image),
-    /// Largest difference from the reference, of both builds.
+    /// Largest difference from the reference in both builds.
     difference: f64,
-    /// Root mean square of the strain's error, of the worse build.
+    /// Root mean square error of the strain in the worse build.
     rms_error: f64,
 }
 
-/// Prints the table; says on standard error what is over budget, and whether README.md is out of date, which it can only
-/// be said to be with the compiler that made it. Whether all is well.
+/// Prints the table; reports on standard error what is over budget, and, with the same compiler, whether README.md is out of
+/// date. Returns true if all is well.
 pub fn report(root: &Path, images: &Path) -> Result<bool, Box<dyn Error>> {
     let budgets = Budgets::read(&root.join("budgets.toml"), &compiler(images)?)?;
     let (measured, mut broken) = measure(root, images)?;
@@ -45,7 +45,7 @@ pub fn report(root: &Path, images: &Path) -> Result<bool, Box<dyn Error>> {
     Ok(broken.is_empty())
 }
 
-/// Writes README.md and the figures of budgets.toml. Whether nothing is there that no budget allows.
+/// Writes README.md and the figures of budgets.toml. Returns true if nothing forbidden was found.
 pub fn update(root: &Path, images: &Path) -> Result<bool, Box<dyn Error>> {
     let (measured, broken) = measure(root, images)?;
     let (path, compiler) = (root.join("budgets.toml"), compiler(images)?);
@@ -60,7 +60,7 @@ pub fn update(root: &Path, images: &Path) -> Result<bool, Box<dyn Error>> {
     Ok(broken.is_empty())
 }
 
-/// Returns the compiler's name for itself in the programs that it made.
+/// Returns the compiler's name as found in the programs that it built.
 fn compiler(images: &Path) -> Result<String, Box<dyn Error>> {
     Ok(fs::read_to_string(images.join("compiler"))?.trim().to_owned())
 }
@@ -69,7 +69,7 @@ fn readme(root: &Path, table: &str) -> Result<String, Box<dyn Error>> {
     Ok(fs::read_to_string(root.join("host/src/introduction.md"))?.replace("{table}\n", table))
 }
 
-/// Measures every program, and lists in words what no budget allows.
+/// Measures every program, and lists in words everything that is forbidden.
 fn measure(root: &Path, images: &Path) -> Result<(Vec<Measured>, Vec<String>), Box<dyn Error>> {
     let csv = fs::read_to_string(root.join("vectors.csv"))?;
     let truth = column(&csv, TRUTH)?;
@@ -91,12 +91,12 @@ fn measure(root: &Path, images: &Path) -> Result<(Vec<Measured>, Vec<String>), B
     Ok((measured, found))
 }
 
-/// The larger of two numbers; NaN if one of them is, which must not hide behind `max`.
+/// Returns the larger of two numbers; NaN if either is NaN, which `max` would hide.
 fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || a > b { a } else { b }
 }
 
-/// Lists what no budget allows.
+/// Lists everything that no budget can permit.
 fn forbidden(name: &str, run: &Run, image: &Image) -> Vec<String> {
     let mut found = Vec::new();
     for symbol in &image.soft_double {
@@ -115,7 +115,7 @@ fn forbidden(name: &str, run: &Run, image: &Image) -> Vec<String> {
 }
 
 impl Measured {
-    /// The figures that have budgets. Time from the fast build, size from the small one, the rest from the worse.
+    /// Returns the figures with budgets: times from the fast build, sizes from the small one, the rest from the worse.
     fn figures(&self) -> Figures {
         let ((fast, fast_image), (small, small_image)) = (&self.fast, &self.small);
         Figures::from([
@@ -132,7 +132,7 @@ impl Measured {
     }
 }
 
-/// A figure, and what it should be.
+/// Formats a figure with its aim.
 fn beside(value: String, aim: Option<f64>) -> String {
     match aim {
         Some(aim) => format!("{value} ({aim})"),
@@ -140,7 +140,7 @@ fn beside(value: String, aim: Option<f64>) -> String {
     }
 }
 
-/// Instructions of a step with three states that were published for others, f32 on a Cortex-M4F.
+/// Published instructions of a step with three states for other filters, f32 on a Cortex-M4F.
 const OTHERS: [(&str, f64); 3] = [("adskalman", 297.0), ("kfilter", 216.0), ("hand-written", 64.0)];
 
 fn table(measured: &[Measured], budgets: &Budgets) -> Result<String, Box<dyn Error>> {

@@ -1,28 +1,28 @@
-//! Report of a program; the layout is that of `firmware/src/frame.rs`.
+//! Report of a program, in the layout of `firmware/src/frame.rs`.
 
 use std::error::Error;
 use std::path::Path;
 
 /// Counts and results of a program.
 pub struct Run {
-    /// Instructions of a step, mean over all readings.
+    /// Mean instructions of a step over all readings.
     pub instructions: f64,
-    /// Instructions of the dearest step.
+    /// Instructions of the most expensive step.
     pub dearest: u32,
     /// Instructions to convert one code.
     pub conversion: f64,
     /// Worst stack of a step, bytes.
     pub stack: u32,
-    /// State, bytes.
+    /// Size of the state, bytes.
     pub state: u32,
-    /// Readings refused.
+    /// Number of refused readings.
     pub refused: u32,
     /// Strain after every reading.
     pub strains: Vec<f32>,
 }
 
 impl Run {
-    /// Reads what a program wrote.
+    /// Reads a program's report.
     pub fn read(path: &Path) -> Result<Self, Box<dyn Error>> {
         let bytes = std::fs::read(path)?;
         let words: Vec<u32> =
@@ -45,17 +45,17 @@ impl Run {
         })
     }
 
-    /// Root mean square of the strains' errors.
+    /// Returns the root mean square of the strains' errors.
     pub fn rms_error(&self, truth: &[f64]) -> f64 {
         let squares = self.strains.iter().zip(truth).map(|(a, b)| (f64::from(*a) - b).powi(2));
         (squares.sum::<f64>() / self.strains.len() as f64).sqrt()
     }
 
-    /// The largest difference of a strain from its reference.
+    /// Returns the largest difference of a strain from its reference.
     pub fn difference(&self, reference: &[f64]) -> f64 {
         self.strains.iter().zip(reference).fold(0.0, |most, (a, b)| {
             let apart = (f64::from(*a) - b).abs();
-            // A NaN must not hide behind `max`.
+            // NaN must not be hidden by `max`.
             if apart.is_nan() || apart > most { apart } else { most }
         })
     }

@@ -1,4 +1,4 @@
-//! The files with codes and expected strains: written once, regenerated and compared ever after.
+//! Files with codes and expected strains: written once, then regenerated and compared.
 
 use std::error::Error;
 use std::fmt::Write;
@@ -9,7 +9,7 @@ use ohmstrain_firmware::{Ekf3, Ekf6, Fast3, Fast6, FastImm6, FastSplit6, Filter,
 
 use crate::codes::{SEED, codes, strains};
 
-/// Programs, in the order of the table, and the filter of the library whose `f64` strain is the reference of each.
+/// Programs in the order of the table, each with the library's filter whose `f64` strain is its reference.
 pub const PROGRAMS: [(&str, &str); 8] = [
     ("ekf3", "ekf3"),
     ("ekf3_varying", "ekf3_varying"),
@@ -21,10 +21,10 @@ pub const PROGRAMS: [(&str, &str); 8] = [
     ("fast_split6", "fast_split6"),
 ];
 
-/// The column of the strain that the codes were made from.
+/// Column of the strain that the codes were computed from.
 pub const TRUTH: &str = "truth";
 
-/// Strains after every code.
+/// Returns the strain after every code.
 fn filtered<F: Filter<f64>>(codes: &[u16]) -> Result<Vec<f64>, Box<dyn Error>> {
     let divider = front_end::<f64>()?;
     let mut filter = F::start()?;
@@ -39,7 +39,7 @@ fn filtered<F: Filter<f64>>(codes: &[u16]) -> Result<Vec<f64>, Box<dyn Error>> {
     Ok(strains)
 }
 
-/// A Rust array of codes.
+/// Formats a Rust array of codes.
 fn array(name: &str, what: &str, codes: &[u16]) -> Result<String, Box<dyn Error>> {
     let mut rust = format!("\n/// {what}\n#[rustfmt::skip]\npub static {name}: [u16; {}] = [\n", codes.len());
     for row in codes.chunks(16) {
@@ -50,7 +50,7 @@ fn array(name: &str, what: &str, codes: &[u16]) -> Result<String, Box<dyn Error>
     Ok(rust)
 }
 
-/// Both files: the codes as Rust, codes and strains as CSV.
+/// Generates both files: the codes as Rust, codes and strains as CSV.
 fn generate() -> Result<[(&'static str, String); 2], Box<dyn Error>> {
     let (three, six) = (codes::<1, 3>()?, codes::<3, 6>()?);
     let provenance = format!(
@@ -95,7 +95,7 @@ pub fn write(root: &Path) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// True if the files are what the generator makes.
+/// True if the files equal those that the generator makes.
 pub fn check(root: &Path) -> Result<bool, Box<dyn Error>> {
     let mut same = true;
     for (name, content) in generate()? {
@@ -107,7 +107,7 @@ pub fn check(root: &Path) -> Result<bool, Box<dyn Error>> {
     Ok(same)
 }
 
-/// A column of the file: the truth, or the strain of a filter.
+/// Returns a column of the file: the truth, or the strain of a filter.
 pub fn column(csv: &str, name: &str) -> Result<Vec<f64>, Box<dyn Error>> {
     let mut lines = csv.lines().filter(|line| !line.starts_with('#'));
     let header = lines.next().ok_or("vectors.csv is empty")?;

@@ -1,4 +1,4 @@
-//! Peak heap per sample of the smoothers, in lines of name and bytes; the readings themselves are not counted.
+//! Peak heap per sample of the smoothers, bytes, without the readings; one line per smoother.
 
 use nalgebra::SVector;
 use ohmstrain_bench_comparison::{adskalman_smoother, typed_kalman_smoother};

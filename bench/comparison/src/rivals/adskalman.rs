@@ -61,7 +61,7 @@ fn start(model: &LinearModel) -> StateAndCovariance<f64, Const<3>> {
     StateAndCovariance::new(SVector::zeros(), SMatrix::from_diagonal(&model.start.into()))
 }
 
-/// adskalman, covariance in Joseph's form as it does by default.
+/// adskalman, with the covariance in Joseph's form, its default.
 pub struct Adskalman {
     matrices: Matrices,
     state: StateAndCovariance<f64, Const<3>>,
@@ -91,7 +91,7 @@ impl Filter for Adskalman {
     }
 }
 
-/// adskalman's smoother. `None` if it fails.
+/// Returns adskalman's smoother, which gives `None` if it fails.
 pub fn smoother(
     model: &LinearModel,
 ) -> impl Fn(&[SVector<f64, 1>]) -> Option<Vec<StateAndCovariance<f64, Const<3>>>> + use<> {

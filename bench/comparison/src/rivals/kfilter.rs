@@ -23,7 +23,7 @@ fn covariance(model: &LinearModel) -> SMatrix<f64, 3, 3> {
     SMatrix::from_diagonal(&model.start.into())
 }
 
-/// kfilter's linear filter; its covariance is (I - K H) P, made symmetric.
+/// kfilter's linear filter, with the covariance (I - K H) P, made symmetric.
 pub struct Linear(Kalman1MLinearNoInput<f64, 3, 1>);
 
 impl Linear {
@@ -43,7 +43,7 @@ impl Filter for Linear {
     }
 }
 
-/// kfilter's unscented filter with α = 1, β = 2, κ = 0, as the others have it; its own α of 10⁻³ costs digits.
+/// kfilter's unscented filter with α = 1, β = 2, κ = 0, as in the others; its own α of 10⁻³ loses digits.
 pub struct Unscented {
     filter: UKFLinearNoInput<f64, 3, 7>,
     measurement: LinearMeasurement<f64, 3, 1>,

@@ -2,7 +2,7 @@ use minikalman::prelude::*;
 use minikalman::regular::builder::{KalmanFilterBuilder, KalmanFilterObservationType, KalmanFilterType};
 use ohmstrain_bench_filters::{Filter, LinearModel};
 
-/// minikalman's regular filter in the buffers that its builder makes.
+/// minikalman's regular filter in the buffers of its builder.
 pub struct Minikalman {
     filter: KalmanFilterType<3, f64>,
     reading: KalmanFilterObservationType<3, 1, f64>,

@@ -11,7 +11,7 @@ pub use self::adskalman::smoother as adskalman_smoother;
 pub use self::nonlinear::every_nonlinear_rival;
 pub use self::typed_kalman::smoother as typed_kalman_smoother;
 
-/// Shows every filter that is not ours, with the readings that ours of three states get.
+/// Passes every other filter to the visitor, with the same readings as our filters of three states.
 pub fn every_rival(model: &LinearModel, visitor: &mut impl Visitor) {
     let readings = readings::<1>(STEPS);
     visitor.visit("nalgebra_3", &readings, nalgebra_straight::Straight::new(model));

@@ -1,7 +1,7 @@
 use nalgebra::{SMatrix, SVector};
 use ohmstrain_bench_filters::{Filter, LinearModel};
 
-/// The textbook with nalgebra's matrices: full matrices, a scalar reading, no check.
+/// Textbook filter with nalgebra's matrices: full matrices, a scalar reading, no checks.
 pub struct Straight {
     transition: SMatrix<f64, 3, 3>,
     noise: SMatrix<f64, 3, 3>,

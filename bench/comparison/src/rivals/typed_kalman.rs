@@ -40,7 +40,7 @@ fn start(model: &LinearModel) -> (SVector<f64, 3>, SMatrix<f64, 3, 3>) {
     (SVector::zeros(), SMatrix::from_diagonal(&model.start.into()))
 }
 
-/// typed-kalman's linear filter: checks and the normalised innovation squared.
+/// typed-kalman's linear filter, with its checks and the normalised innovation squared.
 pub struct Linear {
     matrices: Matrices,
     filter: LinearKf<3>,
@@ -66,7 +66,7 @@ impl Filter for Linear {
     }
 }
 
-/// typed-kalman's unscented filter with its own parameters, which are α = 1, β = 2, κ = 0.
+/// typed-kalman's unscented filter with its own parameters, α = 1, β = 2, κ = 0.
 pub struct Unscented {
     matrices: Matrices,
     filter: Ukf<3>,
@@ -82,7 +82,7 @@ impl Unscented {
 impl Filter for Unscented {
     #[inline]
     fn step(&mut self, reading: f64) -> bool {
-        // The model knows the step's length already.
+        // The model already contains the step's length.
         self.filter.predict(&self.matrices, &self.matrices.noise, 0.0).is_ok()
             && self.filter.update(&self.matrices, &SVector::from([reading]), &self.matrices.variance).is_ok()
     }
@@ -92,7 +92,7 @@ impl Filter for Unscented {
     }
 }
 
-/// typed-kalman's smoother. `None` if it fails.
+/// Returns typed-kalman's smoother, which gives `None` if it fails.
 pub fn smoother(model: &LinearModel) -> impl Fn(&[f64]) -> Option<Vec<Estimate<3>>> + use<> {
     let (matrices, (mean, covariance)) = (Matrices::new(model), start(model));
     move |readings| {

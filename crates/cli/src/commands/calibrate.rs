@@ -141,7 +141,7 @@ pub fn calibrate(args: &CalibrateArgs, messages: &Messages) -> Result<Outcome, C
     Ok(outcome)
 }
 
-/// Rows of a recording between --from and --until.
+/// Returns the rows of a recording between --from and --until.
 pub fn rows_in(args: &CalibrateArgs, recording: &TraceFile) -> Result<Range<usize>, CliError> {
     let rows = recording.between(args.from, args.until);
     if rows.is_empty() && !recording.trace.is_empty() {
@@ -150,7 +150,7 @@ pub fn rows_in(args: &CalibrateArgs, recording: &TraceFile) -> Result<Range<usiz
     Ok(rows)
 }
 
-/// Returns the calibration with the choices that the flags have made.
+/// Returns the calibration that the flags ask for.
 pub fn calibration(args: &CalibrateArgs) -> Calibration<'static> {
     let mut calibration = Calibration::new();
     if let Some(estimator) = args.estimator.chosen() {
@@ -162,7 +162,7 @@ pub fn calibration(args: &CalibrateArgs) -> Calibration<'static> {
     args.branches.chosen().map_or(calibration, |branches| calibration.branches(branches.0))
 }
 
-/// The sensor behind `recordings`.
+/// Returns the sensor behind `recordings`.
 pub fn calibrate_recordings(
     recordings: &[TraceFile],
     calibration: Calibration,

@@ -9,7 +9,7 @@ use serde::Serialize;
 use crate::error::CliError;
 use crate::output;
 
-/// Version of what `--json` prints.
+/// Version of the output of `--json`.
 const SCHEMA: u32 = 1;
 /// Content of the output of `--json`.
 #[derive(Serialize)]
@@ -21,7 +21,7 @@ struct Json<'a> {
     calibration_s: Option<f64>,
     /// Scores of parts that were left out in turn, what limits them, and what the recordings contain.
     left_out: Option<&'a Findings>,
-    /// Scores of the rows that `--from` and `--until` kept from it.
+    /// Scores of the rows that `--from` and `--until` kept out of the calibration.
     tested: Option<&'a Tested>,
     limited_by: Option<Limit>,
     /// Shares of the squared error, 0 to 1.
@@ -29,7 +29,7 @@ struct Json<'a> {
     verdict: Option<String>,
 }
 
-/// Writes it.
+/// Writes the output of `--json`.
 pub fn json(out: &mut dyn Write, closing: &Closing, file: &str) -> Result<(), CliError> {
     let (params, findings) = (closing.params, closing.findings);
     let json = Json {

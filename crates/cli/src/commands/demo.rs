@@ -19,10 +19,10 @@ use crate::run::estimate;
 use crate::sensor_file;
 use ohmstrain_report::{Sample, Scored};
 
-/// Share of the recording that calibrates; the rest is the test.
+/// Share of the recording used for calibration; the rest is the test.
 const CALIBRATION_SHARE: f64 = 0.5;
 
-/// The whole chain on a simulated sensor that is not of the fitted model's family.
+/// Runs the whole chain on a simulated sensor outside the fitted family of models.
 pub fn run(args: &DemoArgs, messages: &Messages) -> Result<(), CliError> {
     let mut outputs = Outputs::new(args.replace.force, []);
     outputs.folder(&args.out)?;

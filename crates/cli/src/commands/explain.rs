@@ -26,7 +26,7 @@ pub fn text(args: &CalibrateArgs, recordings: &[TraceFile], law: &LawParams) -> 
         }
         let found = match identifiability(&samples, law) {
             Ok(found) => found.to_string(),
-            // A law that only its ridge holds up is an answer.
+            // A law that is determined by its ridge penalty alone is a valid answer.
             Err(CalibrationError::Singular) => NOT_TOLD.to_owned(),
             Err(error) => return Err(failed(error)),
         };
@@ -45,7 +45,7 @@ pub fn text(args: &CalibrateArgs, recordings: &[TraceFile], law: &LawParams) -> 
     Ok(text)
 }
 
-/// One row per structure, criteria as differences from the best.
+/// Returns a table with one row per structure; criteria are differences from the best.
 fn structures(scores: &[StructureScore]) -> Table {
     let least = |of: fn(&StructureScore) -> f64| scores.iter().map(of).fold(f64::INFINITY, f64::min);
     let (aic, bic) = (least(|score| score.aic), least(|score| score.bic));

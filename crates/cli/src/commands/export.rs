@@ -43,7 +43,7 @@ pub fn run(args: &ExportArgs) -> Result<(), CliError> {
         let output = outputs.claim(&path, Kind::Source)?;
         outputs.put(output, file.content);
     }
-    // After the places are known to be there, before anything is written to them: it may refuse.
+    // Printed after the outputs are claimed and before anything is written to them: it may refuse.
     print_promise(args, &lines, &promise, worse_on)?;
     outputs.publish()
 }

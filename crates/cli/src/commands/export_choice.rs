@@ -1,4 +1,4 @@
-//! Choice of the filter to export among those that a chip has room for.
+//! Choice of the filter to export among those that fit a chip.
 
 use ohmstrain_sensor::SensorParams;
 
@@ -11,11 +11,11 @@ use ohmstrain_export::{self as export, Budget, Candidate, Plan};
 /// Filter that is exported, and the candidates.
 pub struct Choice {
     pub plan: Plan,
-    /// A table of all candidates, and why the next better one does not fit; none without a budget.
+    /// A table of all candidates, and the reason why the next better one does not fit; empty without a budget.
     pub lines: Vec<String>,
 }
 
-/// Returns the usual time between two readings, s: the requested one, else that of the calibration's recordings.
+/// Returns the usual interval between two readings, s: the requested one, or else that of the calibration's recordings.
 pub fn usual_step_s(asked: Option<f64>, params: &SensorParams) -> Result<f64, CliError> {
     asked.or_else(|| export::usual_step_s(params)).ok_or_else(|| {
         CliError::Arguments(
@@ -24,7 +24,7 @@ pub fn usual_step_s(asked: Option<f64>, params: &SensorParams) -> Result<f64, Cl
     })
 }
 
-/// The sensor's filter, or what is best of it within a budget: by its score on a recording, else by a table.
+/// Returns the sensor's filter, or the best one within a budget: by its score on a recording, or else by a table.
 pub fn choose(
     args: &ExportArgs,
     params: &SensorParams,
@@ -38,7 +38,7 @@ pub fn choose(
     }
 }
 
-/// A candidate; its error, percent of full scale, or its place in the order of the table.
+/// A candidate with its error in percent of full scale, or its rank in the table.
 struct Ranked {
     candidate: Candidate,
     rank: f64,
@@ -75,7 +75,7 @@ fn within(
     Ok(Choice { plan: best.candidate.plan, lines })
 }
 
-/// All candidates, the best by the table first.
+/// Returns a table of all candidates, the best first.
 fn table(ranked: &[Ranked], is_scored: bool) -> Vec<String> {
     let mut table = output::table(["candidate", "%FS", "instructions", "flash, B", "RAM, B", "fits"]);
     for Ranked { candidate: Candidate { words, cost, lacks, .. }, rank } in ranked {

@@ -10,7 +10,7 @@ use crate::error::CliError;
 use crate::output::print;
 use ohmstrain_export::{self as export, Compared, ExportTarget, Plan, Promise, ReplayedRow};
 
-/// A recording with a reference, and what this computer and a static cubic make of it, as they would live.
+/// A recording with a reference, and the live estimates of this computer and of a static cubic for it.
 pub struct OnRecording {
     name: String,
     from_s: Option<f64>,
@@ -35,7 +35,7 @@ impl OnRecording {
         let mut last_s = None;
         for row in 0..recording.trace.len() {
             let (time_s, reading) = recording.reading(row);
-            // What is exported takes an interval for its first step.
+            // The exported filter takes the usual interval for its first step.
             let since_s = last_s.replace(time_s).map_or(dt_s, |last_s| time_s - last_s) as f32;
             rows.push(ReplayedRow { since_s, reading: reading.value, reading_sd: reading.sd });
             let estimate = filter.step(time_s, reading).map_err(|error| refused(&error))?;
@@ -75,18 +75,18 @@ impl OnRecording {
         })
     }
 
-    /// Name of its file.
+    /// Returns the name of its file.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Its error, percent of full scale.
+    /// Returns its error, percent of full scale.
     pub fn error(&self, params: &SensorParams, plan: &Plan, args: &ExportArgs) -> Result<f64, CliError> {
         Ok(self.exported(params, plan, args)?.rmse_percent_fs)
     }
 }
 
-/// Prints the candidates and the promise; refuses what is worse than a static cubic on `recording`, unless it is forced.
+/// Prints the candidates and the promise; refuses a filter that is worse than a static cubic on `recording`, unless forced.
 pub fn print_promise(
     args: &ExportArgs,
     candidates: &[String],
@@ -97,7 +97,7 @@ pub fn print_promise(
         for line in candidates.iter().chain(&promise.lines) {
             writeln!(out, "{line}")?;
         }
-        // Rust was counted once, by scripts/exported-c.sh, for docs/chip.md.
+        // Costs of Rust were counted once, by scripts/exported-c.sh, for docs/chip.md.
         let of = match args.target.into() {
             ExportTarget::C => "",
             ExportTarget::Rust => " of the same in C",

@@ -22,7 +22,7 @@ use crate::stream::{self, RowSource};
 use crate::suits::{self, FIRST_LIVE_READINGS, FIRST_READINGS};
 use crate::whole_file::is_stdin;
 
-/// Turns readings into strain as they arrive; how many rows there are. Memory does not grow with the recording.
+/// Turns readings into strain as they arrive, and returns the number of rows. Memory does not grow with the recording.
 pub fn run(args: &FilterArgs, messages: &Messages) -> Result<u64, CliError> {
     let kind = args.estimate.estimator.chosen().map(|estimator| estimator.0);
     let WrittenArgs { output, replace, columns, .. } = &args.written;
@@ -31,7 +31,7 @@ pub fn run(args: &FilterArgs, messages: &Messages) -> Result<u64, CliError> {
     let claim = args.save_state.as_deref().map(|path| rows_out.claim_beside(path, Kind::State)).transpose()?;
     let mut sensor = sensor_file::read(&args.estimate.sensor, kind)?;
     let stored = args.resume.as_deref().map(filter_state::read).transpose()?;
-    // Built anew once the recording has said its joint, which a stored filter knows already.
+    // Built again once the recording has named its joint; a stored filter already has one.
     let mut filter = FilterRun::new(&sensor, args)?;
     suits::warn_of_start(args.estimate.initial_strain, &sensor, messages);
     let mut rows = stream::open(args)?;
@@ -47,7 +47,7 @@ pub fn run(args: &FilterArgs, messages: &Messages) -> Result<u64, CliError> {
     }
     let (columns, format) = (estimates::columns(&sensor, columns)?, args.written.format());
     let live = is_stdin(&args.trace_file) || !args.trace_file.is_file();
-    // A Parquet file is one with its last row only.
+    // A Parquet file is complete only with its last row.
     let grows = live && format == Format::Csv;
     let writer = EstimateWriter::new(rows_out.open(grows)?, format, columns)?;
     let (watch, quiet) = (ValidityWatch::new(&sensor, None), QuietWatch::new(&sensor, None, &args.estimate.known));
@@ -61,7 +61,7 @@ pub fn run(args: &FilterArgs, messages: &Messages) -> Result<u64, CliError> {
     Ok(written)
 }
 
-/// A filter with or without a lag, and the last row of one without.
+/// A filter with or without a lag; without one, also its last row.
 struct FilterRun {
     filter: Lag,
     row: Option<Estimate>,
@@ -77,7 +77,7 @@ impl FilterRun {
         Self::built(builder(sensor, &args.estimate), args)
     }
 
-    /// One that goes on.
+    /// Creates a filter that resumes from a stored state.
     fn resumed(sensor: &Sensor, args: &FilterArgs, stored: &Stored) -> Result<Self, CliError> {
         let builder = builder(sensor, &args.estimate);
         let filter = match args.lag_s {
@@ -96,7 +96,7 @@ impl FilterRun {
         }
     }
 
-    /// Starts again for a device that has restarted.
+    /// Starts a new filter after the device has restarted.
     fn anew(sensor: &Sensor, args: &FilterArgs) -> Result<Self, Error> {
         Self::built(builder_anew(sensor, &args.estimate), args)
     }
@@ -109,7 +109,7 @@ impl FilterRun {
         Ok(Self { filter, row: None })
     }
 
-    /// Takes a row; the rows that are due.
+    /// Takes a row, and returns the rows that are due.
     fn step(&mut self, time_s: f64, reading: Reading) -> Result<&[Estimate], Error> {
         match &mut self.filter {
             Lag::None(filter) => Ok(std::slice::from_ref(self.row.insert(filter.step(time_s, reading)?))),
@@ -117,7 +117,7 @@ impl FilterRun {
         }
     }
 
-    /// The rows that still wait.
+    /// Returns the rows that are still pending.
     fn finish(&mut self) -> Result<&[Estimate], Error> {
         match &mut self.filter {
             Lag::None(_) => Ok(&[]),
@@ -138,24 +138,24 @@ struct Stream<'a, W: io::Write + Send> {
     args: &'a FilterArgs,
     filter: FilterRun,
     sink: Sink<'a, W>,
-    /// State to resume from.
+    /// State from which the filter resumes.
     stored: Option<Stored>,
-    /// First and last time, s, up to now or until the clock started again.
+    /// First and last time, s, since the start or the last restart of the clock.
     times: Option<(f64, f64)>,
     restarted: bool,
     skipped: Skipped,
 }
 
 impl<'a, W: io::Write + Send> Stream<'a, W> {
-    /// Filters row by row; how many rows were written, and the state if it is to be saved.
+    /// Filters row by row; returns the number of rows written, and the state if it is to be saved.
     fn run(mut self, mut rows: RowSource) -> Result<(u64, Option<String>), CliError> {
         let wanted = self.args.estimate.rest_resistance;
-        // The rows that R₀ is taken from, at least one, are estimated too, once it is known.
+        // The rows that R₀ is computed from, at least one, are estimated too, once R₀ is known.
         let count = if let Some(RestResistance::First(count)) = wanted { count } else { 0 };
         let enough = if self.sink.live { count } else { count.max(FIRST_READINGS) };
         let first = first_rows(&mut rows, self.args.skip_bad, count, enough)?;
         if first.iter().all(Result::is_err) {
-            // What was skipped may be all there was; what stood above the header is not to blame for it.
+            // All lines may have been skipped; a fault in lines above the header is not to blame for that.
             let above = |error: &TraceError| matches!(error, TraceError::Content(fault) if fault.is_foreign);
             let fault = first.into_iter().filter_map(Result::err).find(|error| !above(error));
             return Err(fault.map_or_else(|| no_row(rows.file(), rows.line()), CliError::from));
@@ -180,14 +180,14 @@ impl<'a, W: io::Write + Send> Stream<'a, W> {
             suits::warn_of_unused(&self.args.estimate.known, times, &self.sink.file, self.sink.messages);
         }
         let saves = self.args.save_state.is_some() && streamed.is_ok();
-        // The rows that still wait get their estimates, whatever stopped the stream, and what was estimated is still good.
+        // Pending rows get their estimates whatever stopped the stream, and finished estimates remain valid.
         let finished = if saves { Ok(()) } else { self.finish() };
         let state = saves.then(|| self.state(&rows)).transpose()?;
         let written = self.sink.writer.finish()?;
         streamed.and(finished).map(|()| (written, state))
     }
 
-    /// Returns the state from which the next row can go on.
+    /// Returns the state from which the next row can resume.
     fn state(&self, rows: &RowSource) -> Result<String, CliError> {
         let mut stored = self.filter.store()?;
         stored.rest_resistance = self.sink.rest;
@@ -216,7 +216,7 @@ impl<'a, W: io::Write + Send> Stream<'a, W> {
         self.sink.write(self.filter.step(row.time_s, trace::reading(&row.reading)).map_err(at)?)
     }
 
-    /// The clock has started again: so does the filter. Times stay those of the file.
+    /// Restarts the filter after the clock has restarted. Times stay those of the file.
     fn restart(&mut self, row: &Row, rows: &RowSource) -> Result<(), CliError> {
         let at = format!("{}:{}", self.sink.file, row.line);
         check_unit(&at, rows.reading_kind(), self.sink.sensor.params().reading)?;
@@ -238,7 +238,7 @@ impl<'a, W: io::Write + Send> Stream<'a, W> {
         sink.rest.map_or(Ok(()), |measured| self.filter.rest_resistance(measured))?;
         let told = sink.rest.is_some();
         let stored = self.stored.take();
-        // A filter that goes on knows its R₀.
+        // A resumed filter has its R₀ already.
         sink.rest = sink.rest.or(stored.as_ref().and_then(|stored| stored.rest_resistance));
         sink.watch = ValidityWatch::new(&sink.sensor, sink.rest);
         sink.quiet = QuietWatch::new(&sink.sensor, sink.rest, known);
@@ -249,7 +249,7 @@ impl<'a, W: io::Write + Send> Stream<'a, W> {
         Ok(())
     }
 
-    /// The rows that still wait.
+    /// Writes the rows that are still pending.
     fn finish(&mut self) -> Result<(), CliError> {
         let named = |error| CliError::Input(format!("{}: {error}", self.sink.file));
         let waiting = self.filter.finish().map_err(named)?;
@@ -275,7 +275,7 @@ struct Sink<'a, W: io::Write + Send> {
     header: String,
     /// True for standard input or a pipe, where a reader waits for each row.
     live: bool,
-    /// The first known readings of a live stream.
+    /// First known readings of a live stream.
     early: Vec<f64>,
 }
 
@@ -298,7 +298,7 @@ impl<W: io::Write + Send> Sink<'_, W> {
         if self.live { self.writer.flush() } else { Ok(()) }
     }
 
-    /// Checks the unit of a live stream's readings, once there are enough.
+    /// Checks the unit of a live stream's readings, once enough have arrived.
     fn doubt_early(&self) {
         if self.early.len() == FIRST_LIVE_READINGS
             && let Err(doubt) = self.sensor.check_unit(self.early.iter().copied(), self.rest)
@@ -308,7 +308,7 @@ impl<W: io::Write + Send> Sink<'_, W> {
     }
 }
 
-/// Lines that were none of a trace.
+/// Lines that were not part of a trace.
 #[derive(Default)]
 struct Skipped {
     first: Option<BadContent>,
@@ -328,14 +328,14 @@ impl Skipped {
     }
 }
 
-/// Rows without a reading among which a reading is looked for, where it is not needed.
+/// Rows that are searched for a first reading, if it is not required.
 const MOST_FIRST_ROWS: usize = 10 * FIRST_READINGS;
 
-/// Rows among which readings are looked for that are needed: a bound on memory, and days at 10 Hz.
+/// Rows that are searched for required readings. It bounds memory, and lasts for days at 10 Hz.
 const MOST_WAITING_ROWS: usize = 1 << 20;
 
-/// The first rows: until `wanted` readings are known, or `enough` of them and many rows. An error ends them; it is returned
-/// if fewer readings than that are known.
+/// Returns the first rows: until `wanted` readings are known, or at least `enough` of them in many rows. An error ends the
+/// search; it is returned if fewer than `enough` readings are known.
 fn first_rows(
     rows: &mut RowSource,
     skips_bad: bool,

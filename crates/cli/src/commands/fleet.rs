@@ -10,7 +10,7 @@ use crate::output::{Kind, Outputs, print};
 use crate::sensor_file;
 use crate::whole_file;
 
-/// Learns from sensors of one make.
+/// Learns a prior from sensors of one make.
 pub fn run(args: &FleetArgs, messages: &Messages) -> Result<(), CliError> {
     match &args.command {
         FleetCommand::Fit(args) => fit(args, messages),
@@ -49,7 +49,7 @@ fn told(prior: &Prior, output: &Path) -> String {
     )
 }
 
-/// Reads what a fleet has taught.
+/// Reads the prior of a fleet.
 pub fn read(path: &Path) -> Result<Prior, CliError> {
     let text = whole_file::text(path)?;
     Prior::from_toml(&text).map_err(|error| CliError::Input(error.in_file(&path.display().to_string())))

@@ -10,7 +10,7 @@ use crate::messages::Messages;
 use crate::output::{IMPORT, Kind, Outputs};
 use ohmstrain::MADE_BY;
 
-/// Makes a trace of a lab's files, or of each recording in them. What was taken for what, and what was left out, goes to
+/// Converts a lab's files to a trace, or to one trace per recording. The roles of the columns, and what was left out, go to
 /// stderr.
 pub fn run(args: &ImportArgs, messages: &Messages) -> Result<(), CliError> {
     let mut outputs = Outputs::new(args.replace.force, &args.files);
@@ -31,7 +31,7 @@ pub fn run(args: &ImportArgs, messages: &Messages) -> Result<(), CliError> {
     outputs.publish_or_print(output, bytes)
 }
 
-/// Writes each recording to a file of its own, all of them or none, and prints their names.
+/// Writes each recording to a file of its own, all or none, and prints their names.
 fn split(
     mut outputs: Outputs,
     path: &Path,
@@ -56,14 +56,14 @@ fn split(
     outputs.publish()
 }
 
-/// `trace.csv` → `trace-2.csv`.
+/// Numbers a path: `trace.csv` → `trace-2.csv`.
 fn numbered(path: &Path, number: usize) -> PathBuf {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let extension = path.extension().map_or(String::new(), |extension| format!(".{}", extension.to_string_lossy()));
     path.with_file_name(format!("{stem}-{number}{extension}"))
 }
 
-/// The text of a trace.
+/// Returns the text of a trace.
 fn trace(plan: &Plan, tables: &[Table], messages: &Messages) -> Result<Vec<u8>, CliError> {
     let mut imported = plan.import(tables)?;
     let other = &mut imported.trace.metadata.other;
@@ -75,7 +75,7 @@ fn trace(plan: &Plan, tables: &[Table], messages: &Messages) -> Result<Vec<u8>, 
     Ok(bytes)
 }
 
-/// The text of a recording of all channels.
+/// Returns the text of a recording of all channels.
 fn each(plan: &EachPlan, tables: &[Table], messages: &Messages) -> Result<Vec<u8>, CliError> {
     for (name, reading, reference) in plan.columns(tables) {
         let reference = reference.map_or("no reference".into(), |reference| format!("its reference {reference}"));

@@ -17,7 +17,7 @@ use ohmstrain_report::{FigureFiles, Report, ReportInput, Sample, ScoreRow, Score
 pub struct Reporting<'a> {
     pub recording: &'a TraceFile,
     pub sensor: &'a Sensor,
-    /// Estimator; the sensor's own choice if there is none.
+    /// Estimator; `None` for the sensor's own choice.
     pub kind: Option<EstimatorKind>,
     /// Reading of the rested sensor, if it differs from that in calibration.
     pub rest_resistance: Option<f64>,
@@ -43,7 +43,7 @@ pub struct Wanted<'a> {
 }
 
 impl<'a> Wanted<'a> {
-    /// Claims what the flags ask for; `None` if they ask for nothing.
+    /// Claims the requested files; `None` if none are requested.
     pub fn claim(args: &'a ReportArgs, outputs: &mut Outputs) -> Result<Option<Self>, CliError> {
         let report = args.report.as_deref().map(|path| outputs.claim(path, Kind::Report)).transpose()?;
         let figures = args.figures.as_deref();
@@ -51,7 +51,7 @@ impl<'a> Wanted<'a> {
         Ok((report.is_some() || figures.is_some()).then_some(Self { report, figures }))
     }
 
-    /// Puts what was drawn where it goes.
+    /// Puts report and figures into their places.
     pub fn put(self, drawn: Drawn, outputs: &mut Outputs) -> Result<(), CliError> {
         if let Some(claim) = self.report {
             outputs.put(claim, drawn.html);
@@ -110,7 +110,7 @@ impl Reporting<'_> {
         Ok(Drawn { html: report.html().map_err(failed)?, figures: report.figures().map_err(failed)? })
     }
 
-    /// Rows that were calibrated on look better than others: what is known of those counts, too.
+    /// Returns the verdict. Rows that were calibrated on look better than others, so known scores of those others count, too.
     fn verdict(&self, filter: &Scores, cubic: Option<&Scores>) -> String {
         let params = self.sensor.params();
         let left_out = params.summary.as_ref().filter(|_| self.sample != Sample::Out).map(Known::from);

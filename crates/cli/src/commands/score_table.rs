@@ -3,7 +3,7 @@ use ohmstrain_sensor::Scores;
 
 use crate::output::table;
 
-/// Meaning of the columns, for below the tables; no line is wider than a terminal.
+/// Meaning of the columns, printed below the tables; no line is wider than a terminal.
 pub const KEY: &str = "\
 RMSE, MAE and bias (mean error) are in the unit of the reference; %FS is the RMSE in percent of the
 reference's range in the rows scored. 50/90/95 %: percent of the rows in which the interval of that
@@ -11,12 +11,12 @@ level holds the reference. width: mean width of the 95 % interval, CRPS: ranked 
 both %FS, less is better. log: mean log density, more is better. wrong: percent of the time on the
 wrong branch, more than 20 %FS off for 2 s or longer.";
 
-/// An empty table for [`add_scores`].
+/// Returns an empty table for [`add_scores`].
 pub fn score_table() -> Table {
     table(["estimate", "%FS", "RMSE", "MAE", "bias", "50/90/95 %", "width", "CRPS", "log", "wrong"])
 }
 
-/// One row of scores.
+/// Adds one row of scores.
 pub fn add_scores(table: &mut Table, estimate: &str, scores: &Scores) {
     table.add_row([
         estimate.to_string(),
@@ -32,7 +32,7 @@ pub fn add_scores(table: &mut Table, estimate: &str, scores: &Scores) {
     ]);
 }
 
-/// Coverages in whole percent; nothing where there are none.
+/// Formats coverages in whole percent; empty if there are none.
 pub fn covered(shares: [Option<f64>; 3]) -> String {
     let known: Vec<String> = shares.into_iter().flatten().map(|share| format!("{:.0}", 100.0 * share)).collect();
     known.join("/")

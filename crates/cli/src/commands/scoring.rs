@@ -5,7 +5,7 @@ use ohmstrain_sensor::Scores;
 
 use ohmstrain::trace::TraceFile;
 
-/// Scores of the rows of `part`, of which `estimate` gives strain and deviation; `None` without a reference.
+/// Scores the rows of `part` with strain and deviation from `estimate`; `None` without a reference.
 fn scores(recording: &TraceFile, part: Scored, estimate: impl Fn(usize) -> (f64, Option<f64>)) -> Option<Scores> {
     let times = &recording.trace.time_s;
     let rows: Vec<ScoredRow> = (0..times.len())
@@ -18,12 +18,12 @@ fn scores(recording: &TraceFile, part: Scored, estimate: impl Fn(usize) -> (f64,
     ohmstrain_calib::score(&rows)
 }
 
-/// Scores of estimates; `None` without a reference.
+/// Scores estimates; `None` without a reference.
 pub fn of_estimates(recording: &TraceFile, estimates: &[Estimate], part: Scored) -> Option<Scores> {
     scores(recording, part, |k| (estimates[k].strain, Some(estimates[k].strain_sd)))
 }
 
-/// Scores of a baseline, which runs over the whole recording too; it is given the readings times `moved`.
+/// Scores a baseline, which also runs over the whole recording, on the readings times `moved`; `None` without a reference.
 pub fn of_baseline(recording: &TraceFile, mut baseline: impl Baseline, part: Scored, moved: f64) -> Option<Scores> {
     let trace = &recording.trace;
     let rows = trace.time_s.iter().zip(&trace.readings.values);

@@ -14,15 +14,15 @@ use crate::sensor_file;
 use crate::whole_file::is_stdin;
 use ohmstrain_export::{self as export, ChipEstimate, Plan, ReplayedRow};
 
-/// Steps of a port, which never ends.
+/// Number of steps that are compared from a port, which never ends.
 const STEPS_OF_A_PORT: usize = 600;
-/// The interval is the strain and this many deviations to each side.
+/// Half the width of the interval, in standard deviations.
 const HALF_WIDTH: f64 = 1.96;
-/// The sketch prints five digits; two of them make a deviation.
+/// Resolution of the strain that the sketch prints; the deviation is computed from two printed numbers.
 const PRINTED_TO: f64 = 1e-5;
-/// Another library's `expf` moves an estimate by far less than this share of its deviation.
+/// Tolerance, as a share of the deviation, far above the effect of another library's `expf`.
 const SHARE_OF_DEVIATION: f64 = 0.01;
-/// Share of the steps whose flags may differ, since they lie on a threshold.
+/// Tolerated share of steps with other flags, since a value may lie on a threshold.
 const OTHER_FLAGS: f64 = 0.01;
 
 /// Compares a board's estimates with those of the exported code's twin, given the board's readings.
@@ -75,7 +75,7 @@ impl BoardStep {
         let text = |label: &str| parts.iter().find(|(name, _)| *name == label).map(|(_, value)| *value);
         let number = |label: &str| text(label)?.parse::<f64>().ok();
         let ohm = match text("ohm")? {
-            // What does not fit into Arduino's printed numbers.
+            // Values beyond the range that Arduino prints.
             "ovf" => f64::INFINITY,
             "-ovf" => f64::NEG_INFINITY,
             other => other.parse().ok()?,
@@ -89,11 +89,11 @@ impl BoardStep {
 /// Lines that came from a board.
 struct Received {
     steps: Vec<BoardStep>,
-    /// Lines that are no steps.
+    /// Number of lines that are not steps.
     others: usize,
 }
 
-/// Reads until there are steps enough, from a board's first one on.
+/// Reads until there are enough steps, starting with a board's first one.
 fn listen(args: &SerialCheckArgs) -> Result<Received, CliError> {
     let name = args.port.display().to_string();
     let ends = is_stdin(&args.port) || args.port.is_file();
@@ -138,26 +138,26 @@ fn listen(args: &SerialCheckArgs) -> Result<Received, CliError> {
     }
 }
 
-/// The twin's estimates from the board's readings.
+/// Returns the twin's estimates from the board's readings.
 fn replayed(
     params: &SensorParams,
     plan: &Plan,
     dt_s: f64,
     steps: &[BoardStep],
 ) -> Result<Vec<ChipEstimate>, export::ExportError> {
-    // As the sketch rounds it.
+    // Rounded as the sketch rounds it.
     let row =
         |step: &BoardStep| ReplayedRow { since_s: 1e-6_f32 * step.since_us as f32, reading: step.ohm, reading_sd: 0.0 };
     let rows: Vec<ReplayedRow> = steps.iter().map(row).collect();
     export::replay(params, plan, dt_s, &rows)
 }
 
-/// The largest differences.
+/// Largest differences.
 struct Farthest {
     strain: f64,
     sd: f64,
     least_sd: f64,
-    /// Steps whose flags are others: what lies on a threshold.
+    /// Number of steps with other flags, which happens on a threshold.
     other_flags: usize,
 }
 
@@ -167,7 +167,7 @@ fn compared(steps: &[BoardStep], expected_rows: &[ChipEstimate]) -> Result<Farth
         let (strain, sd) = (f64::from(expected.strain), f64::from(expected.sd));
         let (of_strain, of_sd) = ((step.strain - strain).abs(), (step.sd - sd).abs());
         let least = PRINTED_TO + SHARE_OF_DEVIATION * sd;
-        // Not a number is no agreement.
+        // Written so that NaN is a disagreement.
         if !(of_strain <= least && of_sd <= least) {
             return Err(CliError::Check(format!(
                 "step {}: expected strain {strain:.5} ± {sd:.5} for {} ohm, found {:.5} ± {:.5} on the board; was it \

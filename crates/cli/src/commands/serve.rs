@@ -6,7 +6,7 @@ use crate::messages::Messages;
 use crate::output::print;
 use crate::whole_file;
 
-/// The page, where the program was built with it.
+/// The page, if the program was built with it.
 const PAGE: Option<&[u8]> = include!(concat!(env!("OUT_DIR"), "/page.rs"));
 
 /// Answers a browser on this computer with the page until it is stopped.
@@ -30,7 +30,7 @@ pub fn run(args: &ServeArgs, messages: &Messages) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Answers with the page, or that there is nothing else here.
+/// Answers with the page, or with an error for any other path or method.
 fn answer(request: Request, page: &[u8], messages: &Messages) {
     let asked = format!("{} {}", request.method(), request.url());
     let is_page = ["/", "/index.html"].contains(&request.url());

@@ -25,7 +25,7 @@ pub fn man(args: &ManArgs) -> Result<(), CliError> {
     outputs.publish()
 }
 
-/// Pages of a command and of those below it.
+/// Writes the pages of a command and of its subcommands.
 fn put_pages(command: &Command, folder: &Path, outputs: &mut Outputs) -> Result<(), CliError> {
     for below in command.get_subcommands().filter(|below| !below.is_hide_set()) {
         put_pages(below, folder, outputs)?;

@@ -25,7 +25,7 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
     write(&settings, args.output.as_deref(), &args.replace)
 }
 
-/// The protocol that a person follows, if there is one.
+/// Returns the protocol that the simulated person follows, if there is one.
 fn followed(args: &SimulateArgs) -> Result<Option<Followed>, CliError> {
     let Some(path) = &args.follow else { return Ok(None) };
     let pacing = protocol_file::read(path)?;
@@ -44,7 +44,8 @@ pub fn example(args: &ExampleArgs) -> Result<(), CliError> {
     write(&SimulationSettings::example(), args.output.as_deref(), &args.replace)
 }
 
-/// Simulates and writes, to stdout if no file is given. The file is claimed first: a foreign one is refused before any work.
+/// Simulates and writes a recording, to stdout if no file is given. The file is claimed first, so that a foreign one is refused
+/// before any work.
 fn write(settings: &SimulationSettings, file: Option<&Path>, replace: &ReplaceArgs) -> Result<(), CliError> {
     let mut outputs = Outputs::new(replace.force, []);
     let output = outputs.claim_or_stdout(file, Kind::Simulation)?;
@@ -52,7 +53,7 @@ fn write(settings: &SimulationSettings, file: Option<&Path>, replace: &ReplaceAr
     outputs.publish_or_print(output, bytes)
 }
 
-/// Returns a simulated recording as it is written: marked as one, so that it may be replaced by another.
+/// Returns a simulated recording as text, marked as simulated, so that another may replace it.
 pub fn bytes(settings: &SimulationSettings) -> Result<Vec<u8>, String> {
     let mut trace: Trace = simulate(settings).map_err(|error| error.to_string())?;
     trace.metadata.other.push(("made_by".into(), format!("{MADE_BY} {SIMULATE}")));

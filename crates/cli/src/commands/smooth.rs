@@ -15,9 +15,9 @@ use crate::run::{builder, rest_resistance};
 use crate::sensor_file;
 use crate::suits;
 
-/// Smooths a recording and writes its estimates, all of them or none. Of a long one the states of a few thousand rows are in
-/// memory, and one state for as many others; readings, and estimates, which come out last segment first, wait in temporary
-/// files. How many there are.
+/// Smooths a recording, writes its estimates, all or none, and returns the number of rows. For a long recording, memory holds
+/// the states of a few thousand rows, and one state for each further block of as many. Readings, and estimates, which are
+/// produced last segment first, wait in temporary files.
 pub fn run(args: &SmoothArgs, messages: &Messages) -> Result<u64, CliError> {
     let wanted = args.estimate.estimator.chosen().map(|estimator| estimator.0);
     let WrittenArgs { output, replace, columns, .. } = &args.written;
@@ -65,13 +65,13 @@ fn smooth_into(packed: Packed, builder: FilterBuilder, readings: &StoredReadings
     Ok(segments)
 }
 
-/// Segments of rows that came last segment first: their rates, then what is written of them.
+/// Segments of rows in reverse order of time: for each its rates, then its packed rows.
 struct Segments {
     packed: Packed,
     written: SpooledTempFile,
     /// End of each segment.
     ends: Vec<u64>,
-    /// The segment at hand.
+    /// The current segment.
     bytes: Vec<u8>,
 }
 
@@ -90,7 +90,7 @@ impl Segments {
         Ok(())
     }
 
-    /// The segments in order of time; `see` is shown number and rate of every row.
+    /// Writes the segments in order of time; `see` receives the number and rate of every row.
     fn write_in_order<W: Write + Send>(
         mut self,
         out: &mut EstimateWriter<W>,
@@ -126,7 +126,7 @@ pub fn write_estimates(out: impl Write + Send, sensor: &Sensor, estimates: &[Est
 mod tests {
     use super::*;
 
-    /// Segments that fit in memory, and such that do not.
+    /// Tests segments that fit in memory, and segments that do not.
     #[test]
     fn segments_come_out_in_order_of_time() {
         let text = include_str!("../../../ohmstrain/examples/sensor.toml");

@@ -8,13 +8,13 @@ use super::kind::{Kind, is_this_program};
 use super::unfinished::{Unfinished, folder_of, publish, sync_folder};
 use crate::parquet_table;
 
-/// A file as the system knows it, whatever it is called.
+/// Identity of a file in the system, independent of its name.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Identity {
-    /// Device and number of a file that is there.
+    /// Device and inode number of an existing file.
     #[cfg(unix)]
     Number(u64, u64),
-    /// Its one name without links.
+    /// Its unique name without links.
     Name(PathBuf),
 }
 
@@ -36,26 +36,26 @@ impl Identity {
 
 /// Destination of an output.
 pub enum Destination {
-    /// Into what stands there and takes bytes: a device, a pipe, an open file of this process.
+    /// An existing file that takes bytes directly: a device, a pipe, an open file of this process.
     Through(File),
-    /// A file, whole: written to a temporary neighbour that then takes its place.
+    /// A whole file: written to a temporary neighbour that then replaces it.
     Whole {
-        /// Path without symbolic links: they stay, their target is written.
+        /// Path without symbolic links: the links stay, their target is written.
         path: PathBuf,
         identity: Identity,
-        /// Permissions of the file that exists.
+        /// Permissions of the existing file.
         permissions: Option<Permissions>,
     },
 }
 
-/// Symbolic links in a row; the system follows as many.
+/// Longest chain of symbolic links, as long as the system follows.
 const MOST_LINKS: usize = 40;
 
-/// Bytes that tell what a file is.
+/// Number of first bytes by which the kind of a file is recognised.
 const HEAD: u64 = 4096;
 
 impl Destination {
-    /// Checks that `path` can be written, and leaves it as it is.
+    /// Checks that `path` can be written, and leaves the file as it is.
     pub fn of(path: &Path) -> io::Result<Self> {
         let found = fs::metadata(path).ok();
         if let Some(found) = found.as_ref().filter(|found| !found.is_file() || is_descriptor(path)) {
@@ -65,7 +65,7 @@ impl Destination {
             return Ok(Self::Through(OpenOptions::new().append(true).open(path)?));
         }
         let path = without_links(path)?;
-        // The kind alone: the full text names a temporary file, which nobody asked for.
+        // The error's kind alone, since its full text names a temporary file that the user does not know.
         tempfile::tempfile_in(folder_of(&path)).map_err(|error| io::Error::from(error.kind()))?;
         let permissions = match found {
             Some(found) => {
@@ -82,7 +82,7 @@ impl Destination {
         Ok(Self::Whole { path, identity, permissions })
     }
 
-    /// Returns the file that would be replaced; `None` where bytes go through.
+    /// Returns the file that would be replaced; `None` if bytes go through.
     pub const fn identity(&self) -> Option<&Identity> {
         match self {
             Self::Through(_) => None,
@@ -90,8 +90,8 @@ impl Destination {
         }
     }
 
-    /// True if there is a file with content that is not a `kind` of this program; `own` are the columns of the table that is to
-    /// take its place.
+    /// True if a file exists whose content is not a `kind` of this program; `own` are the columns of the table that will
+    /// replace it.
     pub fn holds_other_than(&self, kind: Kind, own: &[String]) -> io::Result<bool> {
         let Self::Whole { path, .. } = self else { return Ok(false) };
         let mut file = match File::open(path) {
@@ -110,14 +110,14 @@ impl Destination {
         Ok(!head.is_empty() && !kind.wrote(&String::from_utf8_lossy(&head), own))
     }
 
-    /// Writes content, and returns the unfinished file that then takes its place; `None` where bytes go through.
+    /// Writes content, and returns the unfinished file that will replace the old one; `None` if bytes go through.
     pub fn fill(&self, content: &[u8]) -> io::Result<Option<Unfinished>> {
         let (mut file, unfinished) = self.begin()?;
         file.write_all(content)?;
         Ok(unfinished)
     }
 
-    /// A file to write bit by bit, and what then puts it in its place; nothing where bytes go through.
+    /// Opens a file to be written piece by piece, and returns what later replaces the old one; `None` if bytes go through.
     pub fn begin(&self) -> io::Result<(File, Option<Unfinished>)> {
         match self {
             Self::Through(file) => Ok((file.try_clone()?, None)),
@@ -128,7 +128,7 @@ impl Destination {
         }
     }
 
-    /// The file itself, emptied, for what is to be seen as it grows.
+    /// Opens the file itself, emptied, for output that is visible while it grows.
     pub fn grow(&self) -> io::Result<File> {
         match self {
             Self::Through(file) => file.try_clone(),
@@ -136,7 +136,7 @@ impl Destination {
         }
     }
 
-    /// Puts a file that is whole in this place: by its name, or on another file system by a copy.
+    /// Moves a complete file to this place: by a rename, or by a copy from another file system.
     pub fn adopt(&self, draft: &Path) -> io::Result<()> {
         if let Self::Whole { path, permissions, .. } = self {
             permissions.as_ref().map_or(Ok(()), |permissions| fs::set_permissions(draft, permissions.clone()))?;
@@ -155,7 +155,7 @@ impl Destination {
     }
 }
 
-/// True if this is JSON of this program: objects that have all these fields, and name the program.
+/// True if this is JSON of this program: objects that have all these fields and name the program.
 fn is_rows_of_ours(json: impl Read, own: &[String]) -> bool {
     let rows: Option<Vec<serde_json::Map<String, Value>>> = serde_json::from_reader(json).ok();
     let is_ours = |row: &serde_json::Map<String, Value>| {
@@ -165,7 +165,7 @@ fn is_rows_of_ours(json: impl Read, own: &[String]) -> bool {
     rows.is_some_and(|rows| rows.iter().all(is_ours))
 }
 
-/// True if a path names an open file of this process: a new file in its place would not reach the process that opened it.
+/// True if a path names an open file of this process. A new file in its place would not reach the process that opened it.
 fn is_descriptor(path: &Path) -> bool {
     ["/dev/stdout", "/dev/stderr"].iter().any(|name| path == Path::new(name))
         || ["/dev/fd", "/proc/self/fd"].iter().any(|folder| path.starts_with(folder))

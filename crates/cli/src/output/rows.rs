@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use super::{Claim, Kind, Outputs, is_stdout};
 use crate::error::CliError;
 
-/// Bytes that are written at once, unless a reader waits for them.
+/// Bytes that are written at once, unless a reader waits for rows.
 const WRITTEN_AT_ONCE: usize = 1 << 16;
 
 /// Destination of estimates.
@@ -17,7 +17,7 @@ pub struct RowsOut {
 }
 
 impl RowsOut {
-    /// Stdout, or a file for a table with these columns, which is claimed.
+    /// Claims a file for a table with these columns, or stdout.
     ///
     /// # Errors
     /// As [`Outputs::claim`].
@@ -33,8 +33,8 @@ impl RowsOut {
         Ok(Self { outputs, claim })
     }
 
-    /// Opens the writer. A file takes its place in [`RowsOut::publish`], unless it `grows`: of a live stream each row is
-    /// there at once, and stays if the stream breaks.
+    /// Opens the writer. A file is published in [`RowsOut::publish`], unless it `grows`: then each row of a live stream is
+    /// visible at once, and stays if the stream breaks.
     ///
     /// # Errors
     /// If it cannot be written.
@@ -48,7 +48,7 @@ impl RowsOut {
         })
     }
 
-    /// Claims a file that is written with the table.
+    /// Claims a file that is published with the table.
     ///
     /// # Errors
     /// As [`Outputs::claim`].
@@ -61,16 +61,16 @@ impl RowsOut {
         self.outputs.put(claim, content);
     }
 
-    /// Puts a file in its place.
+    /// Publishes the files.
     ///
     /// # Errors
-    /// If that cannot be done.
+    /// If a file cannot be published.
     pub fn publish(self) -> Result<(), CliError> {
         self.outputs.publish()
     }
 }
 
-/// A file whose errors name it.
+/// A file that adds its path to errors.
 struct Named {
     file: File,
     path: PathBuf,
@@ -79,7 +79,7 @@ struct Named {
 impl Write for Named {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let named = |error: io::Error| match error.kind() {
-            // Whoever reads a pipe may leave, and an interrupted call is made again.
+            // A closed pipe is not an error of the file, and an interrupted call is repeated.
             io::ErrorKind::BrokenPipe | io::ErrorKind::Interrupted => error,
             kind => io::Error::new(kind, format!("{}: {error}", self.path.display())),
         };

@@ -1,8 +1,7 @@
-//! Outputs that are not whole yet: files and folders beside their places, under names of this program's own, each locked by
-//! who writes it.
+//! Unfinished outputs: files and folders beside their places, under names of this program's own, each locked by its writer.
 //!
-//! An interrupt (SIGINT) or a request to end (SIGTERM) removes them. Remains of a killed process or a power cut are
-//! recognised by their name and by a lock without a holder: the next output in the same folder removes them.
+//! An interrupt (SIGINT) or a termination request (SIGTERM) removes them. Leftovers of a killed process or a power cut are
+//! recognised by their name and by an unheld lock: the next output in the same folder removes them.
 
 use std::fs::{self, File, Permissions};
 use std::io;
@@ -13,33 +12,33 @@ use tempfile::{Builder, NamedTempFile, TempDir};
 
 /// Prefix of their names.
 const PREFIX: &str = ".ohmstrain-";
-/// Suffix of names of files, and below of those of folders.
+/// Suffix of files; that of folders follows.
 const FILE: &str = ".part";
 const FOLDER: &str = ".parts";
-/// The file in such a folder that is locked.
+/// Name of the locked file in such a folder.
 const LOCK: &str = "lock";
 
-/// Unfinished files of this process; names of finished ones stay, and are not used again.
+/// Unfinished files of this process. Names of finished ones stay in the list, and are not used again.
 static BEGUN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 fn begun() -> MutexGuard<'static, Vec<PathBuf>> {
     BEGUN.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A file that is to take a place.
+/// An unfinished file, which will take its place.
 pub struct Unfinished {
     file: NamedTempFile,
     place: PathBuf,
 }
 
 impl Unfinished {
-    /// An empty file beside its place, with the permissions of what stands there.
+    /// Creates an empty file beside its place, with the permissions of the existing file.
     pub fn beside(place: &Path, permissions: Option<&Permissions>) -> io::Result<Self> {
         let folder = folder_of(place);
         prepare(folder);
         loop {
             let mut begun = begun();
-            // The kind alone: the full text names the temporary file, which nobody asked for.
+            // The error's kind alone, since its full text names a temporary file that the user does not know.
             let named = new_file(Builder::new().prefix(PREFIX).suffix(FILE)).tempfile_in(folder);
             let file = named.map_err(|error| io::Error::from(error.kind()))?;
             begun.push(file.path().to_path_buf());
@@ -57,10 +56,10 @@ impl Unfinished {
     }
 }
 
-/// Puts files in their places, all of them once all are on the disk; a signal comes before or after that.
+/// Publishes all files once their contents are on the disk; a signal takes effect before or after that.
 ///
 /// # Errors
-/// The place that could not be taken, and why.
+/// The place that could not be taken, and the reason.
 pub fn publish(all: Vec<Unfinished>) -> Result<(), (PathBuf, io::Error)> {
     for Unfinished { file, place } in &all {
         file.as_file().sync_all().map_err(|error| (place.clone(), error))?;
@@ -74,21 +73,21 @@ pub fn publish(all: Vec<Unfinished>) -> Result<(), (PathBuf, io::Error)> {
     Ok(())
 }
 
-/// Waits until the names in a folder are on the disk. Not every file system supports it.
+/// Waits until the names in a folder are on the disk. Some file systems do not support it.
 pub fn sync_folder(folder: &Path) {
     if cfg!(unix) {
         let _ = File::open(folder).and_then(|folder| folder.sync_all());
     }
 }
 
-/// A folder for files that are not whole yet; it goes when it is dropped.
+/// A folder for unfinished files, which is removed when it is dropped.
 pub struct UnfinishedFolder {
     folder: TempDir,
     _lock: File,
 }
 
 impl UnfinishedFolder {
-    /// An empty folder in another one.
+    /// Creates an empty folder in another one.
     pub fn inside(parent: &Path) -> io::Result<Self> {
         prepare(parent);
         loop {
@@ -110,8 +109,8 @@ impl UnfinishedFolder {
     }
 }
 
-/// Locks what was just made; `false` if another process took it for a leftover first. Some file systems have no locks, and
-/// no leftovers are removed there.
+/// Locks a new file; returns `false` if another process has taken it for a leftover. Some file systems have no locks; no
+/// leftovers are removed there.
 fn hold(lock: &File, path: &Path) -> bool {
     lock.lock().is_err() || path.exists()
 }
@@ -132,14 +131,14 @@ fn prepare(folder: &Path) {
             _ if is_dir && rest.ends_with(FOLDER) => File::create(path.join(LOCK)),
             _ => continue,
         };
-        // The lock is held until it is gone.
+        // The lock is held until the leftover is removed.
         if lock.as_ref().is_ok_and(|lock| lock.try_lock().is_ok()) {
             let _ = if is_dir { fs::remove_dir_all(&path) } else { fs::remove_file(&path) };
         }
     }
 }
 
-/// Removes what was begun when the process is to end, and then ends as it would have ended.
+/// Removes the unfinished outputs when a signal ends the process, and then lets the signal take its usual effect.
 #[cfg(unix)]
 fn heed_signals() {
     use std::sync::Once;
@@ -168,7 +167,7 @@ fn heed_signals() {
 #[cfg(not(unix))]
 const fn heed_signals() {}
 
-/// Returns the signals that the parent of this process wants it to ignore, a bit each, if the system lists them.
+/// Returns the signals that the parent process has set to be ignored, one bit each, if the system lists them.
 #[cfg(unix)]
 fn ignored_signals() -> u64 {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -176,7 +175,7 @@ fn ignored_signals() -> u64 {
     mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0)
 }
 
-/// A temporary file is private; a result is as readable as the user's umask lets new files be.
+/// Gives new files the permissions of the user's umask, since temporary files are private.
 #[cfg(unix)]
 fn new_file<'a, 'b>(builder: &'a mut Builder<'b, 'b>) -> &'a mut Builder<'b, 'b> {
     use std::os::unix::fs::PermissionsExt;
@@ -188,7 +187,7 @@ const fn new_file<'a, 'b>(builder: &'a mut Builder<'b, 'b>) -> &'a mut Builder<'
     builder
 }
 
-/// The folder that a file lies in.
+/// Returns the folder of a file.
 pub fn folder_of(path: &Path) -> &Path {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,

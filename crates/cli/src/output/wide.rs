@@ -1,14 +1,14 @@
-//! Text that fits a terminal.
+//! Text wrapped to the width of a terminal.
 
 use comfy_table::{ContentArrangement, Row, Table, presets};
 
-/// Columns that no line exceeds where words can be wrapped.
+/// Largest width of a line, where words can be wrapped.
 pub const COLUMNS: usize = 100;
 
-/// Columns of the names before sentences.
+/// Width of the names before sentences.
 const HEAD: usize = 13;
 
-/// A table without rows.
+/// Creates a table without rows.
 pub fn table(header: impl Into<Row>) -> Table {
     let mut table = Table::new();
     table.load_style(presets::ASCII_MARKDOWN);
@@ -23,7 +23,7 @@ pub fn wrapped_table(header: impl Into<Row>) -> Table {
     table
 }
 
-/// A text whose lines are broken between words; what goes on is indented as its line was.
+/// Wraps lines between words; a continued line keeps its indentation.
 pub fn wrapped(text: &str) -> String {
     let line = |line: &str| {
         let indent = &line[..line.len() - line.trim_start().len()];
@@ -32,13 +32,13 @@ pub fn wrapped(text: &str) -> String {
     text.lines().map(line).collect()
 }
 
-/// Names and sentences: a name, then its sentence beside it.
+/// Lays out names, each with its sentence beside it.
 pub fn named(lines: &[(&str, String)]) -> String {
     lines.iter().map(|(name, text)| broken(text, &format!("{name:HEAD$}"), &" ".repeat(HEAD))).collect()
 }
 
-/// The words of one line, broken between them where a line would be longer than [`COLUMNS`]: the first line begins with
-/// `first`, the others with `rest`, and each ends with an end of line. A number stays with its percent sign or its seconds.
+/// Wraps one line between words at [`COLUMNS`]. The first line begins with `first`, the others with `rest`, and each ends with
+/// a line break. A number stays with its percent sign or its seconds.
 fn broken(text: &str, first: &str, rest: &str) -> String {
     let (mut out, mut width, mut is_bare) = (first.to_owned(), first.chars().count(), true);
     for word in with_units(text) {
@@ -58,7 +58,7 @@ fn broken(text: &str, first: &str, rest: &str) -> String {
     out + "\n"
 }
 
-/// The words of a text, each number with its percent sign or its seconds.
+/// Splits a text into words, each number with its percent sign or its seconds.
 fn with_units(text: &str) -> Vec<String> {
     let mut words: Vec<String> = Vec::new();
     for word in text.split_whitespace() {

@@ -1,10 +1,10 @@
 use std::borrow::Cow;
 use std::time::Instant;
 
-/// Between lines that arrive at once, s: two digits above what is written.
+/// Interval between lines that arrive at once, s: a hundred times the resolution of the written times.
 const LEAST_STEP_S: f64 = 1e-4;
 
-/// Lines of a stream under the header that the flags give it; lines without a time get that of their arrival.
+/// Lines of a stream under the header given by a flag; lines without a time get their time of arrival.
 #[derive(Default)]
 pub struct Headed {
     header: Option<String>,
@@ -12,7 +12,7 @@ pub struct Headed {
 }
 
 impl Headed {
-    /// A stream under the header of a flag, if there is one.
+    /// Creates a stream under the header of a flag, if there is one.
     pub fn new(header: Option<&str>) -> Self {
         let Some(header) = header else { return Self::default() };
         let has_time = header.split(',').any(|name| matches!(name.trim(), "time_s" | "time_us"));
@@ -20,12 +20,12 @@ impl Headed {
         Self { header: Some(whole), arrivals: (!has_time).then(Arrivals::default) }
     }
 
-    /// The header with a column of times.
+    /// Returns the header, with a column of times.
     pub fn header(&self) -> Option<&str> {
         self.header.as_deref()
     }
 
-    /// A line with its time.
+    /// Returns a line with its time.
     pub fn line<'a>(&mut self, line: &'a [u8], arrived: Instant) -> Cow<'a, [u8]> {
         match self.arrivals.as_mut().filter(|_| !line.trim_ascii().is_empty()) {
             Some(arrivals) => [format!("{:.6},", arrivals.time_s(arrived)).as_bytes(), line].concat().into(),
@@ -34,8 +34,7 @@ impl Headed {
     }
 }
 
-/// Times of lines that have none: when they arrive. Of several that arrive at once each is a little later than the one
-/// before.
+/// Times of arrival, for lines without a time. Lines that arrive at once are each a little later than the one before.
 #[derive(Default)]
 struct Arrivals {
     first: Option<Instant>,

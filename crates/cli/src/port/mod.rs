@@ -1,4 +1,4 @@
-//! Lines of a port as they come: a serial port, a pipe, the network, or a recording that is played back.
+//! Lines of a port as they arrive: a serial port, a pipe, the network, or a recording that is played back.
 
 mod arrivals;
 mod network;
@@ -14,36 +14,36 @@ use crate::error::CliError;
 pub use arrivals::Headed;
 pub use source::{Event, Source};
 
-/// Time for which rows are taken before anything else is done.
+/// Longest time for which rows are taken in one go.
 const TAKEN_FOR: Duration = Duration::from_millis(20);
 
-/// A row with the time that it is due at.
+/// A row with the time at which it is due.
 pub struct Due<T> {
     pub row: T,
     pub time_s: f64,
-    /// True if the clock has started again.
+    /// True if the clock has restarted.
     pub restarted: bool,
 }
 
-/// Taker of a port's lines.
+/// Consumer of a port's lines.
 pub trait Taker {
-    /// A row of it.
+    /// A parsed row.
     type Row;
 
-    /// The row of a line; `None` if it was no row.
+    /// Parses a line; `None` if it is not a row.
     ///
     /// # Errors
-    /// If the stream turns out to be of no use.
+    /// If the stream is unusable.
     fn parse(&mut self, line: &[u8], arrived: Instant) -> Result<Option<Due<Self::Row>>, CliError>;
 
     /// Takes a row that is due.
     ///
     /// # Errors
-    /// If nothing can go on.
+    /// If the consumer cannot continue.
     fn take(&mut self, due: Due<Self::Row>) -> Result<(), CliError>;
 }
 
-/// Rows of a port, a recording's at the pace at which it was recorded.
+/// Rows of a port; those of a recording at the pace at which it was recorded.
 pub struct Feed<T> {
     source: Source,
     pace: Option<Pace>,
@@ -51,7 +51,7 @@ pub struct Feed<T> {
     held: Option<Due<T>>,
     /// State of the port in words.
     pub status: String,
-    /// True if nothing will come any more.
+    /// True if nothing more will arrive.
     pub has_ended: bool,
 }
 
@@ -70,7 +70,7 @@ impl<T> Feed<T> {
         Ok(Self { source, pace, held: None, status: "waiting".into(), has_ended: false })
     }
 
-    /// Hands on the rows that have come and are due, for a short while.
+    /// Passes on the rows that have arrived and are due, for a short while.
     ///
     /// # Errors
     /// Those of the taker.
@@ -92,12 +92,12 @@ impl<T> Feed<T> {
         Ok(())
     }
 
-    /// True if no row is waiting for its time.
+    /// True if no row is pending.
     pub const fn is_empty(&self) -> bool {
         self.held.is_none()
     }
 
-    /// Waits for a line, where nothing else is to be done, `longest` at most.
+    /// Waits for a line, at most `longest`.
     ///
     /// # Errors
     /// Those of the taker.
@@ -126,10 +126,10 @@ impl<T> Feed<T> {
     }
 }
 
-/// Holds a recording back to the pace at which it was recorded.
+/// Clock that holds a recording back to the pace at which it was recorded.
 struct Pace {
     speed: f64,
-    /// Due time of the first row, and its own time.
+    /// Due time of the first row, and its own time, s.
     started: Option<(Instant, f64)>,
 }
 

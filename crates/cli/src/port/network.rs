@@ -1,4 +1,4 @@
-//! Lines by UDP and TCP.
+//! Lines received by UDP and TCP.
 
 use std::io;
 use std::net::{TcpListener, TcpStream, UdpSocket};
@@ -11,7 +11,7 @@ use crate::error::CliError;
 /// Largest datagram.
 const DATAGRAM: usize = 1 << 16;
 
-/// An address to listen at; one that begins with the colon is that port of every interface.
+/// Returns the address to listen at; one that begins with a colon is that port on every interface.
 fn bound(address: &str) -> String {
     if address.starts_with(':') { format!("0.0.0.0{address}") } else { address.to_owned() }
 }
@@ -20,10 +20,10 @@ fn refused(flag: &str, address: &str, error: &io::Error) -> CliError {
     CliError::Other(format!("{flag} {address}: cannot listen there: {error}"))
 }
 
-/// Takes datagrams of lines, from whoever sends them.
+/// Receives datagrams of lines from any sender.
 ///
 /// # Errors
-/// If nothing can be received there.
+/// If the address cannot be bound.
 pub fn listen_udp(address: &str, send: SyncSender<Event>) -> Result<(), CliError> {
     let socket = UdpSocket::bind(bound(address)).map_err(|error| refused("--udp", address, &error))?;
     thread::spawn(move || {
@@ -45,7 +45,7 @@ pub fn listen_udp(address: &str, send: SyncSender<Event>) -> Result<(), CliError
     Ok(())
 }
 
-/// Sends the lines of a datagram, of which the last needs no end; returns true while there is a receiver.
+/// Sends the lines of a datagram, whose last line needs no end; returns true while there is a receiver.
 fn datagram(mut bytes: &[u8], send: &SyncSender<Event>) -> bool {
     let mut lines = Lines::default();
     while !bytes.is_empty() {
@@ -56,7 +56,7 @@ fn datagram(mut bytes: &[u8], send: &SyncSender<Event>) -> bool {
     lines.finish(send).is_ok()
 }
 
-/// Connects to HOST:PORT again and again; or waits at :PORT for one sender after the other.
+/// Connects to HOST:PORT again and again, or waits at :PORT for one sender after another.
 ///
 /// # Errors
 /// If the address cannot be bound.
@@ -71,7 +71,7 @@ pub fn read_tcp(address: &str, send: SyncSender<Event>) -> Result<(), CliError> 
     Ok(())
 }
 
-/// Reads one connection after the other, as long as there is a receiver.
+/// Reads one connection after another, as long as there is a receiver.
 fn take_turns(next: impl Fn() -> io::Result<TcpStream>, send: &SyncSender<Event>) {
     loop {
         let (read, away) = match next() {

@@ -10,9 +10,9 @@ use std::time::{Duration, Instant};
 use crate::error::{CliError, shell_word};
 use crate::whole_file::is_stdin;
 
-/// Lines that wait at most; then the source waits.
+/// Largest number of pending lines; the source blocks when they are this many.
 const WAITING: usize = 1 << 12;
-/// A line is cut here, and the rest of it dropped: nothing that a device sends is that long.
+/// Longest line, bytes; the rest of a longer line is dropped. No device sends lines that long.
 const LONGEST_LINE: usize = 1 << 13;
 /// Timeout of a read of a port, and the pause before a port that is gone is tried again.
 const READ_TIMEOUT: Duration = Duration::from_millis(100);
@@ -24,7 +24,7 @@ pub enum Event {
     Line(Vec<u8>, Instant),
     /// The port is open.
     Connected,
-    /// The port is gone, or not there yet; why.
+    /// The port is gone, or not there yet, with the reason.
     Away(String),
     /// End of the source.
     Ended,
@@ -39,25 +39,25 @@ pub struct Source {
 }
 
 impl Source {
-    /// One that a thread fills, which `start` starts.
+    /// Creates a source that is filled by the thread that `start` starts.
     ///
     /// # Errors
-    /// If that cannot be done.
+    /// If the thread cannot be started.
     pub fn listening(start: impl FnOnce(SyncSender<Event>) -> Result<(), CliError>) -> Result<Self, CliError> {
         let (send, events) = sync_channel(WAITING);
         start(send)?;
         Ok(Self { events, is_recording: false })
     }
 
-    /// Starts to read.
+    /// Opens a source and starts to read.
     ///
     /// # Errors
-    /// If a file cannot be opened, or stdin is the keyboard. A port that cannot is waited for.
+    /// If a file cannot be opened, or stdin is the keyboard. A port that cannot be opened is waited for.
     pub fn open(path: &Path, baud: u32) -> Result<Self, CliError> {
         let (send, events) = sync_channel(WAITING);
         let is_recording = path.is_file();
         if is_stdin(path) {
-            // The keys are of the view.
+            // The keyboard belongs to the view.
             if io::stdin().is_terminal() {
                 let what = "--port -: stdin is the terminal: pipe readings into it, or name a port or a recording";
                 return Err(CliError::Arguments(what.into()));
@@ -67,7 +67,7 @@ impl Source {
             let unreadable = |error| CliError::file("read", path, &error);
             let mut file = File::open(path).map_err(unreadable)?;
             let mut magic = [0; 4];
-            // A folder can be opened, and not be read.
+            // A folder can be opened, but not read.
             let known = file.read(&mut magic).map_err(unreadable)?;
             if magic[..known].starts_with(&[0x1f, 0x8b]) || &magic == b"PAR1" {
                 let (name, word) = (path.display(), shell_word(&path.display().to_string()));
@@ -116,7 +116,7 @@ pub(super) fn read_to_end(source: &mut dyn Read, send: &SyncSender<Event>) -> Re
     send.send(failed.map_or(Event::Ended, |error| Event::Away(error.to_string())))
 }
 
-/// Reads a pipe again and again: another program may write into it when one has ended.
+/// Reads a pipe again and again: another program may write into it after one has ended.
 fn read_pipe(path: &Path, send: &SyncSender<Event>) {
     loop {
         // Opening it waits for a writer.
@@ -159,7 +159,7 @@ fn read_port(path: &Path, baud: u32, send: &SyncSender<Event>) {
 
 /// Reason why reading stopped.
 pub(super) enum Stop {
-    /// No receiver any more.
+    /// The receiver is gone.
     Unheard,
     /// The source failed.
     Failed(io::Error),
@@ -171,16 +171,16 @@ impl From<SendError<Event>> for Stop {
     }
 }
 
-/// Bytes as lines.
+/// Splits bytes into lines.
 #[derive(Default)]
 pub(super) struct Lines {
     begun: Vec<u8>,
-    /// True if the bytes up to the end of the line are the rest of a line that was cut.
+    /// True if the bytes up to the next end of line belong to a line that was cut.
     is_cut: bool,
 }
 
 impl Lines {
-    /// Reads once and sends the lines that are complete; the number of bytes, 1 if none came in time.
+    /// Reads once and sends the complete lines; returns the number of bytes, or 1 if none came in time.
     pub(super) fn read(&mut self, source: &mut dyn Read, send: &SyncSender<Event>) -> Result<usize, Stop> {
         let mut bytes = [0; 4096];
         let count = match source.read(&mut bytes) {
@@ -208,7 +208,7 @@ impl Lines {
         Ok(count)
     }
 
-    /// Sends what has no end.
+    /// Sends the last line, which has no end.
     pub(super) fn finish(self, send: &SyncSender<Event>) -> Result<(), SendError<Event>> {
         if self.begun.is_empty() { Ok(()) } else { send.send(Event::Line(self.begun, Instant::now())) }
     }

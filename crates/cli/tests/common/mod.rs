@@ -1,4 +1,4 @@
-//! A folder of its own for each test, the program started in it, and what it prints taken apart.
+//! A folder for each test, the program started in it, and its parsed output.
 
 pub mod terminal;
 
@@ -10,16 +10,16 @@ use std::sync::OnceLock;
 use assert_cmd::cargo::cargo_bin_cmd;
 use tempfile::TempDir;
 
-/// Columns of the estimates of a sensor calibrated in ohm and strain: what scripts rely on.
+/// Columns of the estimates of a sensor calibrated in ohm and strain, on which scripts rely.
 pub const ESTIMATES_HEADER: &str = "time_s,resistance_ohm,strain,strain_sd,strain_rate,strain_rate_sd,relaxation,\
      relaxation_sd,baseline,settled_resistance_ohm,settled_resistance_sd_ohm,p_extend,p_hold,p_retract,p_beyond_border,\
      nis,flags";
 
-/// Five readings per second are enough for a calibration of a second.
+/// Five readings per second, which are enough for a calibration within a second.
 pub const SIMULATE: [&str; 8] =
     ["simulate", "--protocol", "mixed", "--speed-mm-s", "5", "--sample-rate-hz", "5", "--mismatched"];
 
-/// Three quarters of the 400 s that `SIMULATE` records.
+/// Three quarters of the 400 s that `SIMULATE` records, s.
 pub const CALIBRATED_UNTIL: &str = "300";
 
 /// A temporary folder in which the program runs, so that messages name files without their folder.
@@ -28,13 +28,13 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// An empty folder.
+    /// Creates an empty folder.
     pub fn new() -> Self {
         Self { folder: TempDir::new().unwrap() }
     }
 
-    /// A folder with `trace.csv`, a simulated recording, and `sensor.toml`, calibrated on three quarters of it for the one
-    /// estimator that this takes no time for.
+    /// Creates a folder with `trace.csv`, a simulated recording, and `sensor.toml`, calibrated on three quarters of it for the
+    /// fastest estimator.
     pub fn calibrated() -> Self {
         static FILES: OnceLock<(String, String)> = OnceLock::new();
         let (trace, sensor) = FILES.get_or_init(|| {
@@ -50,7 +50,8 @@ impl Bench {
         bench
     }
 
-    /// The same with the default estimator, and `closing.json`, what its calibration ended with: half a minute, once.
+    /// Creates the same with the default estimator, and `closing.json`, the summary of its calibration; it takes half a minute,
+    /// once.
     pub fn calibrated_by_default() -> Self {
         static FILES: OnceLock<[String; 3]> = OnceLock::new();
         let names = ["trace.csv", "sensor.toml", "closing.json"];
@@ -81,7 +82,7 @@ impl Bench {
         fs::read_to_string(self.path(name)).unwrap()
     }
 
-    /// Names of all files, sorted.
+    /// Returns the names of all files, sorted.
     pub fn files(&self) -> Vec<String> {
         files_in(self.folder.path())
     }
@@ -99,7 +100,7 @@ impl Bench {
     }
 }
 
-/// Names of the files in a folder, sorted.
+/// Returns the names of the files in a folder, sorted.
 pub fn files_in(folder: &std::path::Path) -> Vec<String> {
     let name = |entry: std::io::Result<fs::DirEntry>| entry.unwrap().file_name().into_string().unwrap();
     let mut names: Vec<String> = fs::read_dir(folder).unwrap().map(name).collect();
@@ -122,7 +123,7 @@ pub struct Run {
 }
 
 impl Run {
-    /// Takes what a process left behind.
+    /// Collects the results of a process.
     pub fn new(arguments: &[&str], output: Output) -> Self {
         let said = String::from_utf8(output.stderr).unwrap();
         let is_warning = |line: &&str| line.starts_with("ohmstrain: warning: ");
@@ -136,14 +137,14 @@ impl Run {
         }
     }
 
-    /// Success without a word on stderr but warnings; what was printed.
+    /// Asserts success without messages on stderr except warnings; returns stdout.
     #[track_caller]
     pub fn ok(self) -> String {
         assert_eq!((self.code, self.stderr.as_str()), (Some(0), ""), "{}", self.command);
         self.stdout
     }
 
-    /// Failure with this exit code and this one line on stderr; on stdout nothing but whole rows.
+    /// Asserts failure with this exit code and this one line on stderr, and only whole rows on stdout.
     #[track_caller]
     pub fn fails(&self, code: i32, message: &str) {
         assert_eq!(self.stderr, format!("ohmstrain: {message}\n"), "{}", self.command);
@@ -151,7 +152,7 @@ impl Run {
         self.printed_whole_rows();
     }
 
-    /// Nothing on stdout, or lines that all have as many cells as the first one and an end.
+    /// Asserts that stdout is empty, or that all its lines are complete and have as many cells as the first one.
     #[track_caller]
     pub fn printed_whole_rows(&self) {
         let cells = |line: &str| line.split(',').count();
@@ -162,15 +163,15 @@ impl Run {
     }
 }
 
-/// A CSV file taken apart; metadata lines are passed over.
+/// A parsed CSV file; metadata lines are skipped.
 pub struct Csv {
-    /// The line with the names.
+    /// The header.
     pub header: String,
     rows: Vec<Vec<String>>,
 }
 
 impl Csv {
-    /// Takes a file apart. No cell of this program's has a quotation mark.
+    /// Parses a file. No cell of this program's output contains a quotation mark.
     #[track_caller]
     pub fn new(text: &str) -> Self {
         let mut lines = text.lines().filter(|line| !line.starts_with('#'));
@@ -180,12 +181,12 @@ impl Csv {
         Self { header, rows }
     }
 
-    /// Number of rows.
+    /// Returns the number of rows.
     pub fn len(&self) -> usize {
         self.rows.len()
     }
 
-    /// The cells of a column.
+    /// Returns the cells of a column.
     #[track_caller]
     pub fn cells(&self, column: &str) -> Vec<&str> {
         let index = self.header.split(',').position(|name| name == column);
@@ -193,14 +194,14 @@ impl Csv {
         self.rows.iter().map(|row| row[index].as_str()).collect()
     }
 
-    /// The numbers of a column.
+    /// Returns the numbers of a column.
     #[track_caller]
     pub fn numbers(&self, column: &str) -> Vec<f64> {
         self.cells(column).iter().map(|cell| cell.parse().unwrap()).collect()
     }
 }
 
-/// A recording with some of its rows changed: `change` gets a row's number, from 0, and its cells.
+/// Returns a recording with some rows changed: `change` receives a row's index, from 0, and its cells.
 pub fn change_rows(trace: &str, mut change: impl FnMut(usize, &mut Vec<String>)) -> String {
     let mut rows = 0;
     let mut changed = String::new();

@@ -1,4 +1,4 @@
-//! The program on a terminal of its own, on a serial port that is the other end of a pseudo-terminal.
+//! The program on a terminal of its own, with a serial port that is the other end of a pseudo-terminal.
 #![cfg(unix)]
 
 use std::io::{Read, Write};
@@ -13,7 +13,7 @@ use portable_pty::{Child, CommandBuilder, MasterPty, PtyPair, PtySize, native_pt
 
 use super::Bench;
 
-/// Longer than anything takes on a busy machine.
+/// Longer than any operation takes on a busy machine.
 pub const PATIENCE: Duration = Duration::from_secs(60);
 
 fn pair(rows: u16, cols: u16) -> PtyPair {
@@ -75,14 +75,14 @@ impl Terminal {
         self.master.resize(PtySize { rows, cols, pixel_width: 0, pixel_height: 0 }).unwrap();
     }
 
-    /// Leaves; what stands on the terminal then.
+    /// Quits the program, and returns the text on the terminal.
     #[track_caller]
     pub fn quit(mut self) -> String {
         self.press("q");
         self.left()
     }
 
-    /// Waits for the end of the program; what stands on the terminal then.
+    /// Waits for the end of the program, and returns the text on the terminal.
     #[track_caller]
     pub fn left(mut self) -> String {
         let start = Instant::now();
@@ -100,14 +100,14 @@ impl Terminal {
     }
 }
 
-/// A serial port's other end.
+/// Other end of a serial port.
 pub struct Port {
     pub device: Box<dyn Write + Send>,
     _pair: PtyPair,
 }
 
 impl Port {
-    /// Plugs it in where `path` points.
+    /// Plugs the port in at `path`.
     pub fn plug_in(path: &Path) -> Self {
         let pair = pair(24, 80);
         let _ = std::fs::remove_file(path);

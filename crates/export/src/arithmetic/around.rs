@@ -1,5 +1,5 @@
-//! Functions in C around a filter: what becomes of a reading, doubts, features of readings for the correction.
-//! The library's own code is run on expressions, once for every way that it may go.
+//! Functions in C around a filter: treatment of a reading, doubts, features of readings for the correction. The library's own
+//! code runs on expressions, once for every path through it.
 
 use ohmstrain_ekf::correction::{Decay, FeatureScale, ReadingFeatures, TIME_CONSTANTS_S};
 use ohmstrain_ekf::live::{Doubts, Flag, Jumps, LiveParts, Repeats, RestFollower, SURPRISING_NIS, Sieve, reported};
@@ -20,7 +20,7 @@ pub struct Around<'a> {
 }
 
 impl Around<'_> {
-    /// All functions, each as a list, too, if there are lists.
+    /// Returns all functions, each also as a list if there are lists.
     pub fn text(&self, lists: Option<&mut Lists>) -> String {
         let of_readings = [Self::pass_time(), self.sieve(), startles(), self.coarser(), weighted(), self.reported()];
         let of_rest = [self.on_followed_rest(), self.of_session(), self.follow(), self.jumped()];
@@ -49,13 +49,13 @@ impl Around<'_> {
         text.join("\n")
     }
 
-    /// Their state from step to step, as fields of a struct.
+    /// Returns their state from step to step, as fields of a struct.
     pub fn fields(&self) -> Vec<String> {
         let Declared { numbers, truths, .. } = self.declared();
         numbers.into_iter().chain(truths).collect()
     }
 
-    /// Names of these fields.
+    /// Returns the names of these fields.
     fn kept(&self) -> Kept {
         self.declared().kept
     }
@@ -313,7 +313,7 @@ impl Around<'_> {
     }
 }
 
-/// The flags of doubts, as C has them.
+/// Flags of doubts, by their names in C.
 const DOUBTS: [(&str, Flag); 5] = [
     ("OHMSTRAIN_START_UP", Flag::StartUp),
     ("OHMSTRAIN_RECOVERING", Flag::Recovering),
@@ -351,7 +351,7 @@ fn startles() -> Printed {
     )
 }
 
-/// Features of the readings for the correction.
+/// Records the features of the readings for the correction.
 fn watch(scale: &FeatureScale<f64>) -> Printed {
     Printed::new(
         "watch",
@@ -384,7 +384,7 @@ fn number<'t>(number: f32) -> Expression<'t> {
     Number::of(number.into())
 }
 
-/// Fields as C declares them; truths last, since they are small.
+/// Fields as C declares them; truth values last, since they are small.
 #[derive(Default)]
 struct Declared {
     numbers: Vec<String>,

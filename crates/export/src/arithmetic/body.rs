@@ -9,13 +9,14 @@ use ohmstrain_ekf::record::{Operation, Place, Recorded};
 use crate::literal::Literal;
 use scopes::Scopes;
 
-/// The lines of a function; what is used once stands where it is used, and what only one way of a choice needs is done on that way.
+/// Lines of a function. A result that is used once is printed where it is used; one that only one arm of a choice needs is
+/// computed in that arm.
 pub struct Body<'a> {
     operations: &'a [Operation],
     /// Number of uses of each result.
     pub uses: Vec<usize>,
     scopes: Scopes,
-    /// Its expression, once it has one, and how tightly that binds.
+    /// Its expression, once it exists, and the operator precedence of that.
     values: Vec<Option<(String, Binds)>>,
     name_of: &'a dyn Fn(usize) -> String,
     pub lines: String,
@@ -32,7 +33,7 @@ enum Binds {
     Atom,
 }
 
-/// Expressions do not grow beyond this.
+/// Longest expression, characters.
 const LONGEST: usize = 84;
 
 impl<'a> Body<'a> {
@@ -50,17 +51,17 @@ impl<'a> Body<'a> {
         }
     }
 
-    /// The expression of a result.
+    /// Returns the expression of a result.
     pub fn value(&mut self, place: Place) -> String {
         self.bound(place, Binds::Choice)
     }
 
-    /// The same, in brackets unless it is a name.
+    /// Returns the expression, in brackets unless it is a name.
     pub fn atom(&mut self, place: Place) -> String {
         self.bound(place, Binds::Atom)
     }
 
-    /// The same, in brackets where it binds less tightly than what is around it.
+    /// Returns the expression, in brackets if it binds less tightly than its surroundings.
     fn bound(&mut self, place: Place, least: Binds) -> String {
         if self.values[place].is_none() {
             let made = self.made(place);
@@ -88,7 +89,7 @@ impl<'a> Body<'a> {
         let (text, binds) = self.expression(place);
         let operation = self.operations[place];
         let is_plain = matches!(operation, Operation::Constant(_) | Operation::Known(_));
-        // What belongs to the state is overwritten in the end: it is read before.
+        // Numbers of the state are overwritten at the end, so they are read before.
         let is_state = matches!(operation, Operation::Input(_) | Operation::Flag(_)) && !text.starts_with("s[");
         if is_plain || !is_state && self.uses[place] <= 1 && text.len() <= LONGEST {
             return (text, binds);
@@ -112,7 +113,7 @@ impl<'a> Body<'a> {
         (name, Binds::Atom)
     }
 
-    /// A choice whose ways are worth a branch, with all that are made with it.
+    /// Prints a choice whose arms are worth a branch, together with all choices made by the same branch.
     fn branch(&mut self, choice: Place) {
         let Some(branch) = self.scopes.branch_of(choice) else { return };
         let mut choices = branch.choices.clone();
@@ -121,7 +122,7 @@ impl<'a> Body<'a> {
         let picks: Vec<_> = choices.iter().map(|place| (*place, self.operations[*place])).collect();
         let Operation::Pick(mask, ..) = self.operations[choice] else { return };
         let mask = self.value(mask);
-        // What is used elsewhere too is done before.
+        // Results that are used elsewhere, too, are computed before the branch.
         for place in shared {
             self.value(place);
         }
@@ -149,7 +150,7 @@ impl<'a> Body<'a> {
         self.lines.push_str("    }\n");
     }
 
-    /// True if a result is a truth value, and no number.
+    /// True if a result is a truth value, not a number.
     pub fn is_truth(&self, place: Place) -> bool {
         match self.operations[place] {
             Operation::Pick(_, yes, _) => self.is_truth(yes),
@@ -189,7 +190,7 @@ impl<'a> Body<'a> {
             Operation::NotNegative(a) => (format!("{} >= 0.0f", self.bound(a, Sum)), Less),
             Operation::Finite(a) => (format!("isfinite({})", self.value(a)), Atom),
             Operation::Both(a, b) => (format!("{} && {}", self.bound(a, Truth), self.bound(b, Less)), Truth),
-            // Compilers want brackets around what is both in either.
+            // Compilers warn of `&&` within `||` without brackets.
             Operation::Either(a, b) => (format!("{} || {}", self.bound(a, Less), self.bound(b, Less)), Either),
             Operation::Not(a) => (format!("!{}", self.bound(a, Atom)), Product),
             Operation::Pick(mask, yes, no) => {

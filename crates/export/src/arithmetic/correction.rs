@@ -6,7 +6,7 @@ use ohmstrain_ekf::record::{write_mixture, write_scaled};
 use super::function::Printed;
 use crate::twin::OwnedLearned;
 
-/// All of them.
+/// Returns all of them.
 pub fn functions(learned: &OwnedLearned<f32>) -> Vec<Printed> {
     let (_, Learned { correction, quadratics }) = learned.learned();
     let mut all = vec![

@@ -1,4 +1,4 @@
-//! A function that was written down for all its ways, in C.
+//! A function in C, recorded along all paths through it.
 
 use std::fmt::Write;
 
@@ -12,7 +12,7 @@ pub const RETURNED: &str = "return";
 /// Prefix of results that are flags in the function's return value.
 const FLAG: &str = "OHMSTRAIN_";
 
-/// A function in C, of what is kept of the readings.
+/// A function in C of the values kept from the readings.
 pub struct Printed {
     pub name: &'static str,
     pub comment: &'static str,
@@ -78,13 +78,13 @@ impl Printed {
     }
 }
 
-/// A function as a list, and compiled.
+/// Combines a function as a list and the compiled one.
 pub fn either(listed: &str, compiled: &str) -> String {
     let listed = listed.replacen("\nstatic ", "\nAPART static ", 1);
     format!("#if OHMSTRAIN_LISTED\n{listed}#else\n{compiled}#endif\n")
 }
 
-/// Fields that functions keep: numbers, and truths after them.
+/// Fields that functions keep: numbers first, then truth values.
 #[derive(Debug, Default)]
 pub struct Kept {
     pub numbers: Vec<String>,
@@ -92,7 +92,7 @@ pub struct Kept {
 }
 
 impl Printed {
-    /// The function as a list, if it is worth one, and compiled.
+    /// Returns the function as a list, if it is worth one, and compiled.
     pub fn either(&self, fields: &Kept, lists: &mut Lists) -> String {
         let compiled = self.text();
         self.listed(fields, lists).map_or_else(|| compiled.clone(), |listed| either(&listed, &compiled))
@@ -175,7 +175,7 @@ impl Printed {
         Some(defined(self.comment, &format!("{of_kind} {}", self.name), &parameters, &body))
     }
 
-    /// Parameters in C.
+    /// Declares the parameters in C.
     fn declared(&self, has_state: bool, changes: bool, outputs: Vec<String>) -> Vec<String> {
         let seen = if changes { "readings *seen" } else { "const readings *seen" };
         let own = self.parameters.iter().map(|parameter| (*parameter).to_owned());

@@ -1,8 +1,10 @@
-//! Recorded operations as a list of bytes, which a loop in C (`templates/listed.c`) goes through: four bytes an operation, where
-//! a compiler for an AVR makes about twenty-seven. The operations, and so the bits, are those of [`Body`](super::body::Body).
+//! Recorded operations as a list of bytes, which a loop in C (`templates/listed.c`) executes. An operation takes four bytes,
+//! against about twenty-seven from a compiler for an AVR. The operations, and so the bits, are those of
+//! [`Body`](super::body::Body).
 //!
-//! A list: number of registers, the same and that of constants, number of inputs, the inputs; operations up to `END`; number of
-//! results, and for each the operand and where it is kept. An operand is one byte: a register, a constant or an input.
+//! Format of a list: number of registers, number of registers and constants, number of inputs, the inputs; operations up to
+//! `END`; number of results, and for each its operand and its place. An operand is one byte: a register, a constant or an
+//! input.
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -13,11 +15,11 @@ use super::body::scopes::Scopes;
 use super::body::uses_of_needed;
 use crate::literal::Literal;
 
-/// Least number of operations that are worth a list.
+/// Smallest number of operations that is worth a list.
 const WORTH: usize = 24;
 
-/// Operations in C, of `a`, `b` and what follows: their codes are their places here. The first two are no operations, those up to `COPY`
-/// take one operand.
+/// Operations in C, on `a`, `b` and further operands; their codes are their indices here. The first two are not operations,
+/// those up to `COPY` take one operand.
 const OPERATIONS: [(&str, &str); 23] = [
     ("SKIP", ""),
     ("SKIP_UNLESS", ""),
@@ -49,16 +51,16 @@ const COPY: u8 = 2;
 const PICK: u8 = 22;
 const END: u8 = 255;
 
-/// Source of an input or place of a result: two bits, and six for the place.
+/// Source of an input or place of a result: two bits for the kind, six for the index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Slot {
     /// A number of the state.
     Number(usize),
-    /// A truth of the state.
+    /// A truth value of the state.
     Truth(usize),
     /// A number of the step.
     Step(usize),
-    /// An argument, or what the caller is given.
+    /// An argument, or an output to the caller.
     Given(usize),
 }
 
@@ -82,17 +84,17 @@ pub struct Lists {
 }
 
 impl Lists {
-    /// The most registers that a list takes.
+    /// Returns the largest number of registers that a list uses.
     pub const fn registers(&self) -> usize {
         self.registers
     }
 
-    /// Names of the codes, in order.
+    /// Returns the names of the codes, in order.
     pub fn names(&self) -> Vec<&'static str> {
         OPERATIONS.iter().map(|(name, _)| *name).collect()
     }
 
-    /// Cases of the operations that occur.
+    /// Returns the cases of the operations that occur.
     pub fn cases(&self) -> Vec<String> {
         let occurring = self.codes.iter().filter(|code| (COPY..PICK).contains(code));
         let case = |code: &u8| {
@@ -114,16 +116,16 @@ enum Operand {
     Input(usize),
 }
 
-/// An operation, or a skip to another one.
+/// An operation, or a jump to another one.
 struct Instruction {
     code: u8,
     result: usize,
     operands: Vec<Operand>,
-    /// The instruction to go on with, of a skip.
+    /// Target instruction of a jump.
     to: usize,
 }
 
-/// Instructions of what was recorded, results in registers of their own.
+/// Instructions of a recorded function, with each result in a register of its own.
 struct Listing<'a> {
     operations: &'a [Operation],
     uses: &'a [usize],
@@ -136,7 +138,7 @@ struct Listing<'a> {
     registers: usize,
 }
 
-/// Definitions of a list in C, its operations and its constants, called `OPERATIONS` and `CONSTANTS`; `None` where it is not worth one,
+/// Defines a list in C, its operations and its constants, called `OPERATIONS` and `CONSTANTS`; `None` if it is not worth one,
 /// or does not fit into bytes. Inputs come from `slot_of`, results go to `kept`.
 pub fn list(
     lists: &mut Lists,
@@ -164,7 +166,7 @@ pub fn list(
     let mut ends = Vec::new();
     for (place, slot) in kept {
         let mut operand = listing.value(*place)?;
-        // What belongs to the state is overwritten in the end: it is read before.
+        // Numbers of the state are overwritten at the end, so they are read before.
         if matches!(operand, Operand::Input(_)) {
             operand = listing.put(COPY, vec![operand]);
         }
@@ -192,7 +194,7 @@ fn constant(number: f32) -> String {
 }
 
 impl Listing<'_> {
-    /// Puts an operation at the end; its result.
+    /// Appends an operation, and returns its result.
     fn put(&mut self, code: u8, operands: Vec<Operand>) -> Operand {
         let result = self.register();
         self.instructions.push(Instruction { code, result, operands, to: 0 });
@@ -213,7 +215,7 @@ impl Listing<'_> {
         }))
     }
 
-    /// The operand of a result, which is computed first if nothing has needed it yet.
+    /// Returns the operand of a result, which is computed first if it has not been needed yet.
     fn value(&mut self, place: Place) -> Option<Operand> {
         if self.values[place].is_none() {
             let made = self.made(place)?;
@@ -263,14 +265,14 @@ impl Listing<'_> {
             Operation::Both(..) => "BOTH",
             Operation::Either(..) => "EITHER",
             Operation::Pick(..) => "PICK",
-            // Of `falling` itself, which is compiled, and of hypotheses.
+            // These occur in `falling`, which is compiled, and in hypotheses.
             Operation::ToExponent(_) | Operation::Tail(_) | Operation::Hazard(_) => return None,
         };
         let operands = operation.operands().map(|operand| self.value(operand)).collect::<Option<Vec<_>>>()?;
         Some(self.put(code_of(code)?, operands))
     }
 
-    /// A choice whose ways are worth a branch, with all that are made with it.
+    /// Lists a choice whose arms are worth a branch, together with all choices made by the same branch.
     fn branch(&mut self, choice: Place) -> Option<()> {
         let branch = self.scopes.branch_of(choice)?;
         let mut choices = branch.choices.clone();
@@ -305,7 +307,7 @@ impl Listing<'_> {
         Some(())
     }
 
-    /// Registers in all, and which of them each result has: from where it is written first to where it is read last.
+    /// Assigns registers: their number, and the register of each result from its first write to its last read.
     fn placed(&self, ends: &[(Operand, Slot)]) -> (usize, Vec<usize>) {
         let mut last = vec![0; self.registers];
         let mut first = vec![usize::MAX; self.registers];
@@ -384,7 +386,7 @@ impl Listing<'_> {
     }
 }
 
-/// Bytes of an instruction.
+/// Returns the length of an instruction in bytes.
 fn length(instruction: &Instruction) -> usize {
     if instruction.code <= SKIP_UNLESS { 4 } else { 2 + instruction.operands.len() }
 }

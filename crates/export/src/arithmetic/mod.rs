@@ -1,4 +1,4 @@
-//! The kernel's arithmetic as functions in C, printed from what the kernel itself wrote down.
+//! The kernel's arithmetic as functions in C, printed from the operations that the kernel recorded.
 
 mod around;
 mod body;
@@ -23,10 +23,10 @@ struct Function {
     name: &'static str,
     comment: &'static str,
     piece: Piece,
-    /// Parameters after the state, and what the results after the state's are written to.
+    /// Parameters after the state, and targets of the results after those of the state.
     inputs: &'static [Input],
     outputs: &'static [&'static str],
-    /// True if a state comes in.
+    /// True if the function takes a state.
     has_state: bool,
     /// Name under which the last result is returned.
     returns: Returns,
@@ -76,7 +76,7 @@ const TAKES: Function = Function {
 /// Functions of rates on a side of zero.
 const SIDE: Function = Function { inputs: &[Input::Number("side")], ..MOVES };
 
-/// A prediction and an update whose direction is left to the rate's distribution.
+/// A prediction and an update whose direction of motion is left to the rate's distribution.
 const OPEN: [Function; 3] = [
     Function { name: "predict_open", comment: "One interval on; the direction is as uncertain as the rate.", ..MOVES },
     Function {
@@ -238,7 +238,7 @@ const SPLITS: [Function; 7] = [
     },
 ];
 
-/// The functions of an extended Kalman filter, each as a list, too, if there are lists.
+/// Returns the functions of an extended Kalman filter, each also as a list if there are lists.
 pub fn of_ekf(
     lists: Option<&mut Lists>,
     carried: Carried,
@@ -252,7 +252,7 @@ pub fn of_ekf(
     functions.map(text).collect::<Vec<_>>().join("\n")
 }
 
-/// Numbers of a step that an extended Kalman filter needs, by their places among all.
+/// Returns the indices of the numbers of a step that an extended Kalman filter needs.
 pub fn steps_of_ekf(carried: Carried, record: impl Fn(Piece) -> Recorded) -> Vec<usize> {
     let mut needed = BTreeSet::new();
     for function in &OPEN {
@@ -267,7 +267,7 @@ pub fn steps_of_ekf(carried: Carried, record: impl Fn(Piece) -> Recorded) -> Vec
     needed.into_iter().collect()
 }
 
-/// The functions of a filter of hypotheses; `splits` if by the sign of the rate.
+/// Returns the functions of a filter of hypotheses; `splits` is true if these are split by the sign of the rate.
 pub fn of_hypotheses(splits: bool, carried: Carried, steps: &[String], record: impl Fn(Piece) -> Recorded) -> String {
     printed(&[&PHASES, if splits { &SPLITS } else { &[] }], (carried, steps), record)
 }
@@ -278,14 +278,14 @@ fn printed(functions: &[&[Function]], state: (Carried, &[String]), record: impl 
 }
 
 impl Function {
-    /// The function as a list, and compiled.
+    /// Returns the function as a list, and compiled.
     fn either(&self, state: (Carried, &[String]), steps: &[usize], recorded: &Recorded, lists: &mut Lists) -> String {
         let compiled = self.text(state, recorded);
         self.listed(state.0, steps, recorded, lists)
             .map_or_else(|| compiled.clone(), |listed| either(&listed, &compiled))
     }
 
-    /// The same as a list, if it is worth one. Of the numbers of a step those at these places are there.
+    /// Returns the function as a list, if it is worth one. Only the numbers of a step with these indices are available.
     fn listed(&self, carried: Carried, steps: &[usize], recorded: &Recorded, lists: &mut Lists) -> Option<String> {
         let state = if self.has_state { carried.means + carried.covariances } else { 0 };
         let inputs = self.names_of_inputs(carried);
@@ -345,7 +345,7 @@ impl Function {
         let parameters = self.parameters(recorded.operations.iter().enumerate().any(is_of_step));
         let mut results = String::new();
         for (k, (target, place)) in targets.iter().zip(&recorded.results).enumerate() {
-            // What stays as it is need not be written.
+            // An unchanged number need not be written.
             if !(changes && recorded.operations[*place] == Operation::Input(k)) {
                 let _ = writeln!(results, "    {target} = {};", body.value(*place));
             }
@@ -376,7 +376,7 @@ impl Function {
         all
     }
 
-    /// Names of the inputs between state and step.
+    /// Returns the names of the inputs between state and step.
     fn names_of_inputs(&self, carried: Carried) -> Vec<String> {
         let state = carried.means + carried.covariances;
         let names = |input: &Input| match input {
@@ -387,7 +387,7 @@ impl Function {
     }
 }
 
-/// A number of a state, of means and covariances that are called so.
+/// Returns the name of a number of a state with these names of means and covariances.
 fn entry([means, covariances]: [&str; 2], carried: Carried, number: usize) -> String {
     match number.checked_sub(carried.means) {
         None => format!("{means}[{number}]"),

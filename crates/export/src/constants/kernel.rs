@@ -24,16 +24,16 @@ pub struct StepConstants {
     evenly: Literal,
     longest_pause_s: Literal,
     usual: Vec<Literal>,
-    /// The numbers of a step without length; `None` is infinite.
+    /// The numbers of a step of length zero; `None` is infinite.
     instant: Vec<Option<Literal>>,
-    /// The numbers of the whole steps of a pause.
+    /// The numbers of the whole steps that a pause is divided into.
     whole: Vec<Vec<Literal>>,
     lower_s: Literal,
     upper_s: Literal,
     nodes: Vec<Literal>,
     inverses: Vec<Literal>,
     rows: Vec<Vec<Literal>>,
-    /// Reciprocals: name, and what it is one over.
+    /// Reciprocals: name, and name of the denominator.
     reciprocals: Vec<(String, String)>,
 }
 
@@ -57,8 +57,8 @@ impl SharedConstants {
 }
 
 impl StepConstants {
-    /// Returns the constants of a sensor, by the names that the kernel gives them.
-    /// Those that the filter does not need are left out.
+    /// Returns the constants of a sensor, with the names that the kernel gives them. Constants that the filter does not need
+    /// are left out.
     pub fn new<const B: usize, const N: usize>(sensor: &FixedRate<'_, B, N>, recorded: &Recorded) -> Self {
         let (table, names) = (&sensor.table, &recorded.names);
         let all: Vec<usize> = (0..table.rows[0].len()).collect();
@@ -95,7 +95,7 @@ pub struct Recorded {
     pub numbers: MixtureNumbers,
     /// Names of the values that depend on the length of a step, as in C.
     pub names: Vec<String>,
-    /// Places of those that the filter needs; `None` if it needs all, and the probabilities of a chain of phases after them.
+    /// Indices of those that the filter needs; `None` if it needs all, followed by the probabilities of a chain of phases.
     pub steps: Option<Vec<usize>>,
 }
 
@@ -103,7 +103,7 @@ impl Recorded {
     /// Records the kernel of a sensor.
     ///
     /// # Errors
-    /// If the filter cannot work with its numbers.
+    /// If the filter refuses its numbers.
     pub fn new<const B: usize, const N: usize>(
         sensor: &FixedRate<'_, B, N>,
         lists: Option<&mut Lists>,

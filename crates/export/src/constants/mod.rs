@@ -20,7 +20,7 @@ use super::{ExportError, too_many_branches};
 use kernel::{Recorded, SharedConstants, StepConstants};
 use readings::{DoubtConstants, FollowConstants, SieveConstants};
 
-/// A sensor as the templates have it.
+/// A sensor in the form that the templates take.
 #[derive(Debug, Serialize)]
 pub struct Exported {
     made_by: String,
@@ -29,19 +29,19 @@ pub struct Exported {
     quantity_unit: &'static str,
     reading_name: &'static str,
     reading_unit: &'static str,
-    /// Column of a trace that the readings stand in.
+    /// Column of a trace with the readings.
     reading_column: &'static str,
     joint: bool,
     dt_s: Literal,
     dt_us: u64,
     dt_ms: f64,
     rest_reading: Literal,
-    /// Resistance at rest in calibration, or by the law where it has not rested then (`has_rested`), and the factor by which it
-    /// may read something else.
+    /// Resistance at rest in calibration, or by the law if the sensor was not rested then (`has_rested`), and the factor by
+    /// which today's may differ.
     rested: Literal,
     has_rested: bool,
     farthest_rest: Literal,
-    /// True if zero is a strain that it can have.
+    /// True if zero is a strain within its limits.
     rests_at_zero: bool,
     lower: Literal,
     upper: Literal,
@@ -54,11 +54,11 @@ pub struct Exported {
     rests: bool,
     start_mean: Vec<Literal>,
     start_variance: Vec<Literal>,
-    /// Variance of a strain that is known at a start, and its tolerance beyond the limits.
+    /// Variance of a known initial strain, and its tolerance beyond the limits.
     known_variance: Literal,
     known_beyond: Literal,
     reading_variance: Literal,
-    /// Weight that the second hypothesis of a second look gets.
+    /// Weight of the second hypothesis of a second look.
     beside_share: Literal,
     sieve: SieveConstants,
     doubt: DoubtConstants,
@@ -68,20 +68,20 @@ pub struct Exported {
     fresh_variance: Vec<Literal>,
     /// Factor on the exponent of a likelihood; `None` without tempering.
     tempering: Option<Literal>,
-    /// `None` where the direction never is left open.
+    /// `None` if the direction is never left open.
     forgets_s: Option<Literal>,
     limits: SharedConstants,
     correction: Option<CorrectionConstants>,
-    /// The kernel as functions in C, and what stands around it.
+    /// The kernel as functions in C, and the functions around it.
     arithmetic: String,
     around: String,
     /// Constants of the lists of operations; `None` without lists.
     lists: Option<ListConstants>,
     /// State from step to step, as C declares it.
     fields: Vec<String>,
-    /// Plan of the filter in words, and about what it costs.
+    /// Plan of the filter in words, and its approximate cost.
     words: String,
-    /// True if it is less than what a computer runs.
+    /// True if it is reduced against the filter on a computer.
     is_smaller: bool,
     /// Promises and scores, line by line.
     promise: Vec<String>,
@@ -110,13 +110,13 @@ impl ListConstants {
 /// Names of the filter.
 #[derive(Debug, Serialize)]
 struct EstimatorText {
-    /// Name at the beginning of a sentence, in prose, and on the command line.
+    /// Name at the start of a sentence, in prose, and on the command line.
     title: &'static str,
     prose: &'static str,
     name: &'static str,
     /// Its type in Rust.
     rust: String,
-    /// Number of hypotheses that it follows; 0 for a single Gaussian.
+    /// Number of hypotheses; 0 for a single Gaussian.
     hypotheses: usize,
 }
 
@@ -150,7 +150,7 @@ impl Exported {
         let filter = &chip.filter;
         let live = sensor.narrow();
         let LiveParts { strain_sd_scale, limits, reading_variance, .. } = live;
-        // Hypotheses and corrections are too large for a chip that has no room for compiled functions.
+        // Chips without room for compiled functions have no room for hypotheses and corrections either.
         let is_small = filter.kind == EstimatorKind::Ekf && filter.correction.is_none();
         let mut lists = Lists::default();
         let recorded = Recorded::new(&sensor, is_small.then_some(&mut lists))?;
@@ -224,7 +224,7 @@ impl Exported {
         Ok(exported)
     }
 
-    /// A literal that is no number would not compile, or worse.
+    /// Refuses literals that are not finite, which would not compile, or worse.
     fn check_finite(&self) -> Result<(), ExportError> {
         let scalars =
             [self.rest_reading, self.rested, self.lower, self.upper, self.strain_sd_scale, self.reading_variance];

@@ -1,4 +1,4 @@
-//! Limits of plausible readings, and of what widens an interval.
+//! Limits of plausible readings, and constants of the widening of intervals.
 
 use ohmstrain_ekf::live::{DoubtParts, RestBounds, Sieve};
 use serde::Serialize;
@@ -17,7 +17,7 @@ pub struct SieveConstants {
     error_time_s: Option<Literal>,
 }
 
-/// Constants of the doubts, which make an interval wider than the filter's own.
+/// Constants of the doubts, which widen the filter's own interval.
 #[derive(Debug, Serialize)]
 pub struct DoubtConstants {
     low: Literal,
@@ -28,9 +28,9 @@ pub struct DoubtConstants {
     /// Variances.
     start: Literal,
     most: Literal,
-    /// Variance of the strain that the filter does not state.
+    /// Variance of strain errors that the filter does not state.
     unstated: Literal,
-    /// 1 where readings grow from rest on, -1 where they fall, 0 where it is not known.
+    /// 1 if readings grow from rest on, -1 if they fall, 0 if unknown.
     sign: Literal,
     zero: Literal,
     unread: UnreadConstants,
@@ -38,7 +38,7 @@ pub struct DoubtConstants {
     turns: Option<TurnConstants>,
 }
 
-/// Between which readings R₀ is calibration's.
+/// Range of readings within which R₀ remains the calibration's.
 #[derive(Debug, Serialize)]
 pub struct FollowConstants {
     low: Option<Literal>,
@@ -47,7 +47,7 @@ pub struct FollowConstants {
     start: Option<[Literal; 2]>,
 }
 
-/// Constants of rows without a reading.
+/// Constants for rows without a reading.
 #[derive(Debug, Serialize)]
 struct UnreadConstants {
     rate_time_s: Literal,
@@ -56,7 +56,7 @@ struct UnreadConstants {
     anywhere: Literal,
 }
 
-/// Constants of the sensor at rest.
+/// Constants for the sensor at rest.
 #[derive(Debug, Serialize)]
 struct RestConstants {
     rested: Literal,
@@ -65,7 +65,7 @@ struct RestConstants {
     end: Literal,
 }
 
-/// Constants of the turns of readings.
+/// Constants for turning points of readings.
 #[derive(Debug, Serialize)]
 struct TurnConstants {
     turn: Literal,
@@ -73,7 +73,7 @@ struct TurnConstants {
 }
 
 impl DoubtConstants {
-    /// Converts those of a sensor; a strain below `zero` counts as zero.
+    /// Converts the constants of a sensor; a strain below `zero` counts as zero.
     pub fn new(seen: &DoubtParts<f32>, zero: Literal) -> Self {
         Self {
             low: Literal(seen.low),
@@ -106,7 +106,7 @@ impl DoubtConstants {
 }
 
 impl FollowConstants {
-    /// Converts those of a sensor.
+    /// Converts the constants of a sensor.
     pub fn new(bounds: RestBounds<f32>) -> Self {
         let start = bounds.start.map(|start| [Literal(start.reading), Literal(start.weight)]);
         Self { low: bounds.low.map(Literal), high: bounds.high.map(Literal), start }
@@ -114,7 +114,7 @@ impl FollowConstants {
 }
 
 impl SieveConstants {
-    /// Converts those of a filter.
+    /// Converts the constants of a filter.
     pub fn new(sieve: &Sieve<f32>) -> Self {
         let finite = |number: f32| number.is_finite().then_some(Literal(number));
         Self {

@@ -8,12 +8,12 @@ use super::{ChipFilter, FixedRate, Plan, Protections, StepNumbers, Task, TwinFil
 
 const SENSOR: &str = include_str!("../../../../tests/fixtures/representative.toml");
 
-/// A sensor whose correction is that of phase histories.
+/// Returns a sensor whose correction belongs to phase histories.
 fn sensor() -> Sensor {
     Sensor::from_toml(SENSOR).unwrap()
 }
 
-/// The same with hypotheses about the sign of the rate in their place, and sessions that differ.
+/// Returns the same sensor with sign-split hypotheses instead, and with different sessions.
 fn sign_split_sensor() -> Sensor {
     let mut params = sensor().params().clone();
     let mut estimator = params.estimators[&EstimatorKind::Hypotheses];
@@ -21,7 +21,7 @@ fn sign_split_sensor() -> Sensor {
     params.estimators = [(EstimatorKind::SignSplit, estimator)].into();
     params.correction.iter_mut().for_each(|correction| correction.corrects = EstimatorKind::SignSplit);
     params.sessions = Some(Sessions { rest_sd: 0.15, start_sd: 0.07 });
-    // The recording below turns every few seconds, and does not while readings are missing.
+    // The recording below turns every few seconds, except while readings are missing.
     params.validity.longest_unturned_s = Some(2.5);
     params.unstated = Unstated { filter_sd: 0.01, smoother_sd: 0.02 };
     Sensor::from_params(params).unwrap()
@@ -34,7 +34,7 @@ struct RecordedRow {
     reading: Option<f64>,
 }
 
-/// A recording of the law's own readings, at times that jitter by milliseconds.
+/// Returns a recording of the law's own readings, at times that jitter by milliseconds.
 fn rows(params: &SensorParams) -> Vec<RecordedRow> {
     let law = params.law.to_model::<2>().unwrap();
     let mut time_s = 0.0;
@@ -47,15 +47,15 @@ fn rows(params: &SensorParams) -> Vec<RecordedRow> {
     (0..3000).map(row).collect()
 }
 
-/// Estimates of the twin in double precision, row by row.
+/// Returns the estimates of the twin in double precision, row by row.
 fn twin(sensor: &Sensor, kind: EstimatorKind, rows: &[RecordedRow], protections: Protections) -> Vec<Gaussian<f64>> {
     let params = sensor.params();
     let parts = ChipFilter::new(params, &Plan { kind: Some(kind), ..Plan::default() }).unwrap();
     of_computer(params, &parts, Replayed { rows, protections })
 }
 
-/// Runs a task with the twin in double precision, whose steps are those of a computer: lengths to a nanosecond, and pauses divided
-/// as where no table ends.
+/// Runs a task with the twin in double precision, with the steps of a computer: lengths rounded to a nanosecond, and pauses
+/// divided without the limits of a table.
 fn of_computer<J: Task<f64>>(params: &SensorParams, parts: &ChipFilter, task: J) -> J::Output {
     let mut fixed = FixedRate::<2, 5>::new::<15>(params, parts, 0.05).unwrap();
     let longest_s = longest_step_s::<2, 5, 15>(&fixed.reference, &fixed.parts).unwrap();
@@ -63,7 +63,7 @@ fn of_computer<J: Task<f64>>(params: &SensorParams, parts: &ChipFilter, task: J)
     with_twin::<_, 2, 5, 15, _>(&fixed, fixed.reference, fixed.exact(), task).unwrap()
 }
 
-/// Rows as they are.
+/// Task that replays rows unchanged.
 struct Replayed<'a> {
     rows: &'a [RecordedRow],
     protections: Protections,
@@ -89,7 +89,7 @@ impl Task<f64> for Replayed<'_> {
     }
 }
 
-/// Estimates of the library's filter, row by row.
+/// Returns the estimates of the library's filter, row by row.
 fn library(filter: &mut Filter, rows: &[RecordedRow]) -> Vec<(f64, f64)> {
     let row = |row: &RecordedRow| {
         let estimate = filter.step(row.time_s, row.reading).unwrap();
@@ -156,8 +156,8 @@ fn filters() -> Vec<(Sensor, EstimatorKind)> {
     all
 }
 
-/// The twin in double precision is the filter of the library, bit for bit and from the first row: through faults, pauses of half a
-/// second to a day and rows without a reading, and on another day, when R₀ follows in both.
+/// Tests that the twin in double precision equals the library's filter, bit for bit and from the first row: through faults,
+/// pauses of half a second to a day and rows without a reading, and on another day, when both adapt R₀.
 #[test]
 fn the_twin_in_double_precision_is_the_librarys_filter() {
     for ((sensor, kind), day) in filters().into_iter().flat_map(|of| [(of.clone(), 1.0), (of, 1.4)]) {
@@ -175,7 +175,7 @@ fn the_twin_in_double_precision_is_the_librarys_filter() {
     }
 }
 
-/// A protection that is turned off in one, and how it is turned off in the other.
+/// A protection that is turned off in the twin, and the way to turn it off in the library.
 type Switch = (Protections, fn(FilterBuilder<'_>, f64) -> FilterBuilder<'_>);
 
 const SWITCHES: [Switch; 5] = [
@@ -186,7 +186,7 @@ const SWITCHES: [Switch; 5] = [
     (Protections { doubts: false, ..Protections::ALL }, |row, _| row.without_doubts()),
 ];
 
-/// An unplugging, a number that is stuck, spikes, a bad contact, and another day.
+/// Adds faults to a recording: an unplugged sensor, a stuck number, spikes, a bad contact, and another day.
 fn faulty(mut rows: Vec<RecordedRow>) -> Vec<RecordedRow> {
     for (k, row) in rows.iter_mut().enumerate() {
         row.reading = row.reading.map(|reading| match k {
@@ -201,7 +201,7 @@ fn faulty(mut rows: Vec<RecordedRow>) -> Vec<RecordedRow> {
     rows
 }
 
-/// Compares twins with a protection turned off: the library's filter without it, which differs from the one with it.
+/// Compares twins and library filters without a protection, which differ from those with it.
 #[test]
 fn what_is_turned_off_is_off_in_both() {
     let sensor = sensor();

@@ -10,7 +10,7 @@ use ohmstrain_sensor::correction::OwnedCorrection;
 use super::number;
 use crate::quadratic::OwnedQuadratic;
 
-/// A correction, and what stands for rows that were left out.
+/// A correction, and the quadratic functions that replace rows left out.
 pub struct OwnedLearned<T: Real> {
     features: FeatureScale<T>,
     rows: OwnedCorrection<T, FILTER_INPUTS>,

@@ -1,5 +1,5 @@
-//! The exported program in Rust, in any precision: the library's live filter, whose steps are made of the numbers that the program
-//! in C computes them from.
+//! The exported program in Rust, in any precision: the library's live filter, whose steps are computed from the same numbers as
+//! in the C program.
 
 mod learned;
 pub mod parts;
@@ -19,12 +19,12 @@ pub use learned::OwnedLearned;
 use parts::number;
 pub use parts::{Numbers, Parts, bits, filter_parts};
 
-/// Numbers of the chain.
+/// Number of probabilities of the chain.
 const CHAIN: usize = 9;
 
-/// A filter whose steps can be made of given numbers.
+/// A filter whose steps are computed from given numbers.
 pub trait StepNumbers<T>: Copy {
-    /// Changes the length of steps to `step_s`, whose numbers are given.
+    /// Sets the length of steps to `step_s`, with its numbers.
     fn set_numbers(&mut self, step_s: T, numbers: &[T], chain: [[T; 3]; 3]);
 }
 
@@ -49,7 +49,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize> StepNumbers<T> for
 /// A filter as it is exported.
 pub struct Twin<'a, T, F> {
     filter: F,
-    /// Most hypotheses that it keeps.
+    /// Largest number of hypotheses that it keeps.
     hypotheses: usize,
     numbers: Numbers<'a, T>,
     /// Numbers of hypotheses that have been propagated, with a reading and without.
@@ -110,7 +110,7 @@ where
     }
 }
 
-/// A twin with all that stands around it.
+/// A twin with everything around it.
 pub type TwinFilter<'a, T, F, const N: usize, const L: usize> = LiveFilter<T, Twin<'a, T, F>, Learned<'a, T>, N, L>;
 
 /// A task for a sensor's twin.
@@ -133,7 +133,7 @@ pub trait Task<T: Real> {
 /// Runs a task with the twin of a sensor, in the precision of a model.
 ///
 /// # Errors
-/// If the filter cannot work with its numbers, or refuses a step.
+/// If the filter refuses its numbers, or a step.
 pub fn with_twin<T: Real, const B: usize, const N: usize, const L: usize, J: Task<T>>(
     sensor: &FixedRate<'_, B, N>,
     model: SwitchedModel<T, B, N>,
@@ -158,7 +158,7 @@ pub fn with_twin<T: Real, const B: usize, const N: usize, const L: usize, J: Tas
     output.map_err(refused)
 }
 
-/// A task, and the sensor that it is done with.
+/// A task, and the sensor for it.
 struct Of<'a, 'b, T, J, const B: usize, const S: usize> {
     sensor: &'a FixedRate<'b, B, S>,
     numbers: Numbers<'a, T>,

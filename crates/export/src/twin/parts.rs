@@ -7,7 +7,7 @@ use ohmstrain_sensor::{EstimatorKind, PhaseParams, PortableCorrection};
 
 use crate::quadratic::OwnedQuadratic;
 
-/// Flags as `ohmstrain_flag` in C has them.
+/// Flags in the order of `ohmstrain_flag` in C.
 const BITS: [(Flag, u32); 10] = [
     (Flag::Missing, 1),
     (Flag::Implausible, 2),
@@ -21,7 +21,7 @@ const BITS: [(Flag, u32); 10] = [
     (Flag::RestMoved, 512),
 ];
 
-/// The flags of the exported program in C.
+/// Converts flags to those of the exported program in C.
 pub fn bits(flags: Flags) -> u32 {
     BITS.into_iter().fold(0, |all, (flag, bit)| if flags.has(flag) { all | bit } else { all })
 }
@@ -32,7 +32,7 @@ pub struct Parts<'a> {
     pub kind: EstimatorKind,
     /// Durations of phases, and of rests if the body rests; `None` for a filter without phases.
     pub phases: Option<PhaseParams>,
-    /// Surroundings of the filter. The lengths of its steps are those of single precision.
+    /// Surroundings of the filter. Lengths of steps are those of single precision.
     pub live: LiveParts<f64, ()>,
     pub correction: Option<&'a PortableCorrection>,
     /// Stand-in for rows of the correction that were left out.
@@ -41,34 +41,34 @@ pub struct Parts<'a> {
 
 /// Numbers that depend on the length of a step.
 pub struct Numbers<'a, T> {
-    /// The kernel's numbers, then nine probabilities of the chain, for a length, s.
+    /// Function that computes, for a length in s, the kernel's numbers and then nine probabilities of the chain.
     pub of: Box<dyn Fn(T) -> Vec<T> + 'a>,
-    /// The length that is prepared for a step, s.
+    /// Function that computes the effective length of a step, s.
     pub length_s: fn(T) -> T,
 }
 
-/// A number of a file, as exactly as the precision can have it.
+/// Converts a number of a file to the precision.
 pub fn number<T: Real>(value: f64) -> T {
     T::of(value)
 }
 
 impl Parts<'_> {
-    /// The limits, in any precision.
+    /// Returns the limits in any precision.
     pub fn limits_in<T: Real>(&self) -> StrainRange<T> {
         self.live.to().limits
     }
 }
 
-/// Dwell times of phases, and what weighs hypotheses.
+/// Returns the dwell times of phases and the evidence that weights hypotheses.
 ///
 /// # Errors
-/// If single precision has no such numbers.
+/// If single precision cannot represent them.
 pub fn filter_parts<T: Real>(
     phases: &PhaseParams,
     limits: StrainRange<T>,
 ) -> Result<(Dwell<T>, Evidence<T>), StepError> {
     let dwell = Dwell::new(number(phases.hold_time_s), number(phases.move_time_s), number(phases.reversal));
     let evidence = Evidence::new(limits, number(phases.tempering));
-    // Checked when the file was read; single precision may still turn a number into zero.
+    // Checked when the file was read, but single precision may still round a number to zero.
     dwell.and_then(|dwell| Ok((dwell, evidence?))).map_err(|_| StepError::NonFiniteState)
 }

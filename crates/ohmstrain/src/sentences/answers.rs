@@ -1,4 +1,4 @@
-//! Doubts with what answers them: flags and lines of a file on the command line, arguments in Python.
+//! Doubts with their answers: flags and lines of a file on the command line, arguments in Python.
 
 #[cfg(feature = "calibrate")]
 use ohmstrain_calib::Lag;
@@ -7,7 +7,7 @@ use ohmstrain_calib::Lag;
 use crate::{CalibrationDoubt, LagDoubt};
 use crate::{Quiet, ReferenceDoubt, StartDoubt, UnitDoubt, UnitGuess, UnusedKnown};
 
-/// Interface through which a sensor is used, and doubts are answered.
+/// Interface through which a sensor is used and doubts are answered.
 ///
 /// ```
 /// let quiet = ohmstrain::Quiet { from_s: 12.0, now_s: 42.1, strain: 0.031 };
@@ -31,7 +31,7 @@ impl Interface {
 }
 
 impl UnitDoubt {
-    /// The doubt and its answer.
+    /// Returns the doubt and its answer.
     ///
     /// ```
     /// fn warn(doubt: &ohmstrain::UnitDoubt) {
@@ -59,7 +59,7 @@ impl UnitDoubt {
 }
 
 impl ReferenceDoubt {
-    /// The doubt and its answer.
+    /// Returns the doubt and its answer.
     ///
     /// ```
     /// let doubt = ohmstrain::ReferenceDoubt { expected: 0.3, found: 30.0, is_of_calibration: false };
@@ -81,7 +81,7 @@ impl ReferenceDoubt {
 }
 
 impl StartDoubt {
-    /// The doubt, behind the name of what was given.
+    /// Returns the doubt, after the name of the option.
     ///
     /// ```
     /// let doubt = ohmstrain::StartDoubt { found: 0.35, lower: 0.0, upper: 0.33 };
@@ -94,7 +94,7 @@ impl StartDoubt {
 }
 
 impl UnusedKnown {
-    /// The doubt, behind what was given.
+    /// Returns the doubt, after the known strain.
     ///
     /// ```
     /// let doubt = ohmstrain::UnusedKnown { known: ohmstrain::Known::new(70.0, 0.1), first_s: 0.0, last_s: 60.0 };
@@ -111,7 +111,7 @@ impl UnusedKnown {
 }
 
 impl Quiet {
-    /// The question and its answer.
+    /// Returns the question and its answer.
     ///
     /// ```
     /// let quiet = ohmstrain::Quiet { from_s: 12.0, now_s: 42.1, strain: 0.031 };
@@ -128,7 +128,7 @@ impl Quiet {
 
 #[cfg(feature = "calibrate")]
 impl CalibrationDoubt {
-    /// The doubt and its answer.
+    /// Returns the doubt and its answer.
     ///
     /// ```
     /// let doubt = ohmstrain::CalibrationDoubt::TurnedApart { recordings: [1, 0] };
@@ -178,7 +178,7 @@ impl CalibrationDoubt {
     }
 }
 
-/// Decision about a reference that is not on the clock of the readings, with its sentence; see [`LagDoubt::answer`].
+/// Decision about a reference that does not have the clock of the readings, with its sentence; see [`LagDoubt::answer`].
 ///
 /// ```
 /// use ohmstrain::{Interface, LagAnswer, LagDoubt};
@@ -191,7 +191,7 @@ impl CalibrationDoubt {
 pub enum LagAnswer {
     /// The reference is moved, as requested.
     Move(Lag, String),
-    /// The reference is not calibrated on.
+    /// The reference is not used for calibration.
     Refuse(String),
     /// The reference stays, which may be wrong.
     Warn(String),

@@ -1,4 +1,4 @@
-//! Doubts about recordings of a calibration, in sentences.
+//! Sentences for doubts about the recordings of a calibration.
 
 use std::fmt;
 

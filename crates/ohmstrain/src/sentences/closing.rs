@@ -6,11 +6,11 @@ use serde::Serialize;
 use super::number::{fixed, shown, significant};
 use super::verdict::{Known, is_better, percent, verdict};
 
-/// Advice that is printed; the rest is counted.
+/// Number of pieces of advice that are printed; the others are only counted.
 const PRINTED_ADVICE: usize = 1;
-/// A tenth of the range with a smaller share of the rows than this is named.
+/// Share of the rows below which a tenth of the range is named.
 const SELDOM: f64 = 0.04;
-/// One speed has quartiles, and a highest percentile, that differ by noise alone: up to this factor.
+/// Ratio of two quantiles of the speed up to which they count as one speed, since they differ by noise alone.
 const ONE_SPEED: f64 = 1.1;
 
 /// Summary of a calibration, for people.
@@ -26,7 +26,7 @@ const ONE_SPEED: f64 = 1.1;
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Closing<'a> {
-    /// The file that it is in, if it is in one.
+    /// Name of its file, if it has one.
     pub file: Option<&'a str>,
     /// The sensor.
     pub params: &'a SensorParams,
@@ -85,7 +85,7 @@ impl Closing<'_> {
         (!known.is_empty()).then(|| verdict(&known))
     }
 
-    /// True if its errors, wherever they are known, are below the static cubic's by more than chance; `None` if none are known.
+    /// True if all its known errors are below 0.9 times the static cubic's; `None` if none are known.
     ///
     /// ```
     /// fn warn(closing: &ohmstrain::Closing) {
@@ -99,7 +99,7 @@ impl Closing<'_> {
         is_better(&self.known())
     }
 
-    /// Tells by how much intervals are wider than the estimator's for errors on rows that it was not fitted to.
+    /// Describes by how much intervals are wider than the estimator's, to cover errors on held-out rows.
     fn widened(&self) -> Option<String> {
         let sd = self.params.unstated.filter_sd;
         let share = percent(100.0 * sd / self.params.limits.span());
@@ -192,7 +192,7 @@ fn error_in_test(tested: &Tested) -> String {
     )
 }
 
-/// Range, gaps in it, speeds and holds.
+/// Describes the range, its least visited tenth, speeds and holds.
 fn seen(seen: &RecordingSummary, quantity: Quantity) -> String {
     let (scale, unit) = shown(quantity);
     let number = |x: f64| significant(scale * x, 3).replace('−', "-");
@@ -228,7 +228,7 @@ fn seen(seen: &RecordingSummary, quantity: Quantity) -> String {
     )
 }
 
-/// Returns the sources of the error: shares of it, the largest first. One line of a terminal.
+/// Lists the sources of the error with their shares, the largest first, in one line of a terminal.
 fn limited_by(found: &Findings) -> String {
     let whole = |share: f64| fixed(100.0 * share, 0);
     let share = |(limit, share): (Limit, f64)| format!("{} {} %", limit.name(), whole(share));
@@ -236,7 +236,7 @@ fn limited_by(found: &Findings) -> String {
     format!("{shares} of squared error; wrong way in {} %", whole(found.budget.wrong_rows))
 }
 
-/// The same with what the shares are made of.
+/// Lists them together with the numbers behind the shares.
 fn limited_by_in_full(found: &Findings) -> String {
     let budget = &found.budget;
     format!(

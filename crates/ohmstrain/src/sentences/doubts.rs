@@ -1,4 +1,4 @@
-//! Doubts in sentences, as questions to whoever knows.
+//! Sentences for doubts, as questions to the user.
 
 use std::fmt;
 

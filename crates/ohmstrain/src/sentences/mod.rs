@@ -1,5 +1,5 @@
-//! Sentences and numbers about a sensor for people: the summary of a calibration, doubts and the answers to them. Command
-//! line, Python and report use the same ones; the length of lines and their breaks are their own.
+//! Sentences and numbers about a sensor for people: the summary of a calibration, doubts and their answers. Command line,
+//! Python and report share them, but wrap lines on their own.
 
 mod answers;
 #[cfg(feature = "calibrate")]

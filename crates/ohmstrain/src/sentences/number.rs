@@ -1,11 +1,11 @@
-//! Numbers as people read them: as many digits as mean something, and a true minus sign.
+//! Numbers for people: only significant digits, and a true minus sign.
 
 use ohmstrain_sensor::Quantity;
 
 /// Significant digits of a value whose uncertainty is not known.
 const DIGITS: i32 = 4;
 
-/// `value` with four significant digits, trailing zeros of the fraction dropped; an en dash if it is not finite.
+/// Formats `value` with four significant digits, without trailing zeros of the fraction; an en dash if it is not finite.
 ///
 /// ```
 /// use ohmstrain::number::plain;
@@ -17,7 +17,7 @@ pub fn plain(value: f64) -> String {
     significant(value, DIGITS)
 }
 
-/// `value` with the given number of significant digits.
+/// Formats `value` with the given number of significant digits.
 ///
 /// ```
 /// assert_eq!(ohmstrain::number::significant(1384.529, 2), "1400");
@@ -33,7 +33,7 @@ pub fn significant(value: f64, digits: i32) -> String {
     trimmed(fixed(value, decimals))
 }
 
-/// `value ± error`, both rounded to the error's second digit.
+/// Formats `value ± error`, both rounded to the error's second digit.
 ///
 /// ```
 /// assert_eq!(ohmstrain::number::with_error(1.234_56, 0.034_9), "1.235 ± 0.035");
@@ -50,7 +50,7 @@ pub fn with_error(value: f64, error: f64) -> String {
     format!("{} ± {}", fixed(value, decimals), fixed(error, decimals))
 }
 
-/// A share as a percentage, one decimal.
+/// Formats a share as a percentage with one decimal.
 ///
 /// ```
 /// assert_eq!(ohmstrain::number::percent(0.953_4), "95.3 %");
@@ -59,7 +59,7 @@ pub fn percent(share: f64) -> String {
     if share.is_finite() { format!("{} %", fixed(100.0 * share, 1)) } else { plain(share) }
 }
 
-/// Factor and unit in which people read a quantity: strains in percent, angles in degrees.
+/// Returns the factor and the unit in which people read a quantity: strains in percent, angles in degrees.
 ///
 /// ```
 /// assert_eq!(ohmstrain::number::shown(ohmstrain::Quantity::Strain), (100.0, " %"));
@@ -71,7 +71,7 @@ pub const fn shown(quantity: Quantity) -> (f64, &'static str) {
     }
 }
 
-/// `value` with `decimals` digits after the point; a negative number of them rounds before the point.
+/// Formats `value` with `decimals` digits after the point; a negative number of them rounds before the point.
 ///
 /// ```
 /// assert_eq!(ohmstrain::number::fixed(-1234.567, 1), "−1234.6");
@@ -96,7 +96,7 @@ pub fn reads_better_in_powers(value: f64) -> bool {
     value != 0.0 && !(-5..7).contains(&exponent(value))
 }
 
-/// `m·10ⁿ`.
+/// Formats a number as `m·10ⁿ`.
 ///
 /// ```
 /// assert_eq!(ohmstrain::number::in_powers(123_456.0, 3), "1.23·10⁵");
@@ -112,7 +112,7 @@ pub fn in_powers(value: f64, digits: i32) -> String {
     format!("{mantissa}·10{raised}")
 }
 
-/// Power of ten of the leading digit; 0 for zero.
+/// Returns the power of ten of the leading digit; 0 for zero.
 ///
 /// ```
 /// assert_eq!([0.02, 0.0, 250.0].map(ohmstrain::number::exponent), [-2, 0, 2]);

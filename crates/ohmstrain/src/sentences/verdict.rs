@@ -4,10 +4,10 @@ use ohmstrain_sensor::{Scores, Summary};
 
 use super::number::fixed;
 
-/// Below this share of the static cubic's error an estimate is clearly better, below this one better.
+/// Ratios to the static cubic's error below which an estimate is clearly better, and better.
 const CLEARLY_BETTER: f64 = 0.5;
 const BETTER: f64 = 0.9;
-/// Coverages of 95 % intervals that are taken for right.
+/// Smallest coverage of 95 % intervals that counts as right.
 const COVERED: f64 = 0.9;
 /// Mean width of 95 % intervals, in percent of full scale, above which they carry little information: the standard deviation of a
 /// constant guess in the middle of an evenly used range gives 113.
@@ -27,9 +27,9 @@ const WIDE: f64 = 60.0;
 #[derive(Clone, Copy, Debug)]
 pub struct Known {
     error: f64,
-    /// The static cubic's, if there is one.
+    /// Error of the static cubic, if there is one.
     static_cubic: Option<f64>,
-    /// Share of the rows, 0 to 1, that the 95 % interval holds.
+    /// Share of the rows, 0 to 1, that lie in the 95 % interval.
     covered: f64,
     width: f64,
 }
@@ -70,13 +70,13 @@ impl From<&Summary> for Known {
     }
 }
 
-/// The largest of the errors as a share of the static cubic's; `None` without one.
+/// Returns the largest ratio of an error to the static cubic's; `None` without one.
 fn worst_ratio(known: &[Known]) -> Option<f64> {
     let ratios = known.iter().filter_map(|part| part.static_cubic.map(|cubic| part.error / cubic));
     ratios.max_by(f64::total_cmp)
 }
 
-/// True if all errors are below the static cubic's, by more than chance; `None` without one.
+/// True if all errors are below 0.9 times the static cubic's; `None` without one.
 ///
 /// ```
 /// assert_eq!(ohmstrain::verdict::is_better(&[]), None);
@@ -110,7 +110,7 @@ fn of_intervals(known: &[Known]) -> &'static str {
     }
 }
 
-/// A number in percent as people read it: two digits below ten, whole ones above.
+/// Formats a number in percent for people: two digits below ten, whole ones above.
 ///
 /// ```
 /// assert_eq!([3.24, 40.2].map(ohmstrain::verdict::percent), ["3.2 %", "40 %"]);
@@ -153,7 +153,7 @@ mod tests {
         assert_eq!(verdict(&[part(0.2, 0.01), part(0.03, 0.03)]), worst);
     }
 
-    /// A sensor that is not better is shown by its errors, whatever the sentence.
+    /// Tests that a sensor that is not better is recognised by its errors, whatever the sentence.
     #[test]
     fn what_is_not_better_is_told_by_its_errors() {
         let part = |error: f64| Known::new(&scores(error, 0.1), Some(&scores(0.1, 1.0)));

@@ -6,30 +6,30 @@ use super::TraceFile;
 use crate::number::significant;
 use crate::{Error, Recording, marked_references};
 
-/// Marks of a recording, of a file of their own or of the recording itself.
+/// Marks of a recording, from a file of their own or from the recording itself.
 #[derive(Clone, Debug)]
 pub struct Marked {
-    /// Place of the recording among all of them.
+    /// Index of the recording.
     pub recording: usize,
-    /// Name of the file that the marks stand in.
+    /// Name of the file that contains the marks.
     pub name: String,
     /// Quantity of the marks' strains.
     pub quantity: ReferenceQuantity,
     /// The marks, in order of time.
     pub marks: Vec<Mark>,
-    /// Line of each mark in the file; empty if each stands for several.
+    /// Line of each mark in the file; empty if a mark comes from several lines.
     pub lines: Vec<u64>,
 }
 
 impl Marked {
-    /// Marks that a recording itself has, see [`TraceFile::marks`].
+    /// Returns the marks of a recording itself; see [`TraceFile::marks`].
     #[must_use]
     pub fn of_trace(recording: usize, file: &TraceFile) -> Option<Self> {
         let quantity = file.trace.reference.as_ref()?.quantity;
         Some(Self { recording, name: file.name.clone(), quantity, marks: file.marks()?, lines: Vec::new() })
     }
 
-    /// A fault with the file and the line, or the mark, that it is about.
+    /// Formats a fault with the file and the line, or the mark, that it concerns.
     #[must_use]
     pub fn fault(&self, fault: &MarksError) -> String {
         let line = |mark: usize| match (self.lines.get(mark), self.marks.get(mark)) {
@@ -40,7 +40,7 @@ impl Marked {
         format!("{}{}: {fault}", self.name, fault.mark().map_or(String::new(), line))
     }
 
-    /// Sentence on the reference that was found.
+    /// Describes the reference that was found.
     #[must_use]
     pub fn remark(&self, found: &MarkedReference) -> String {
         let marks = self.marks.iter().map(|mark| mark.strain);
@@ -60,9 +60,9 @@ impl Marked {
 }
 
 impl TraceFile {
-    /// Marks that stand in the recording itself: its strain has a standard deviation, is known in holds, and unknown between any two of
-    /// them, as `ohmstrain record` writes it. A hold is longer than the rows in which it is certain, see [`probable_hold`]. `None` for
-    /// any other recording.
+    /// Returns the marks in the recording itself: a strain with a standard deviation that is known in holds and unknown between
+    /// them, as `ohmstrain record` writes it. A hold is extended beyond the rows in which it is certain; see [`probable_hold`].
+    /// `None` for any other recording.
     #[must_use]
     pub fn marks(&self) -> Option<Vec<Mark>> {
         let reference = self.trace.reference.as_ref().filter(|reference| !reference.sd.is_empty())?;
@@ -93,10 +93,10 @@ impl TraceFile {
     }
 }
 
-/// Gives recordings the references that their marks make, and returns these.
+/// Turns the marks of recordings into references, sets them and returns them.
 ///
 /// # Errors
-/// As [`marked_references`]; recordings in errors are places in `marked`.
+/// As [`marked_references`]; indices of recordings in errors refer to `marked`.
 pub fn take_marks(recordings: &mut [TraceFile], marked: &[Marked]) -> Result<Vec<MarkedReference>, Error> {
     if marked.is_empty() {
         return Ok(Vec::new());

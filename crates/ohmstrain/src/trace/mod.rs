@@ -1,4 +1,4 @@
-//! Recordings as traces: the rows of a trace CSV, with the name, the header and the hash of the file that they stand in.
+//! Recordings as traces: the rows of a trace CSV, with the name, the header and the hash of its file.
 
 mod marks;
 
@@ -17,7 +17,7 @@ use crate::number::significant;
 use crate::{CalibrationDoubt, Error, Interface, Reading, Recording};
 pub use marks::{Marked, take_marks};
 
-/// Rows that take no part in a calibration, named one by one.
+/// Number of excluded rows that are named one by one.
 const NAMED_ROWS: usize = 5;
 
 /// A recording in memory.
@@ -29,7 +29,7 @@ pub struct TraceFile {
     pub header: String,
     /// SHA-256 of its bytes, hexadecimal.
     pub sha256: String,
-    /// Rows of the file before the first one here.
+    /// Number of rows of the file before the first one here.
     pub first_row: usize,
     /// Its contents.
     pub trace: Trace,
@@ -44,7 +44,7 @@ pub enum TraceFileError {
         /// Name of its header.
         header: String,
     },
-    /// A row is not as it must be.
+    /// A row is invalid.
     #[error("{name}: data {error}")]
     Samples {
         /// Its name.
@@ -52,12 +52,12 @@ pub enum TraceFileError {
         /// The row and what is wrong with it.
         error: SamplesError,
     },
-    /// No row lies between the times that are asked for.
+    /// No row lies between the requested times.
     #[error("{name}: no row is left by {flags}; the recording goes from {first_s} to {last_s} s")]
     NoRows {
         /// Its name.
         name: String,
-        /// Flags of the command line that ask.
+        /// Flags of the command line with these times.
         flags: String,
         /// Time of its first row, s, in six digits.
         first_s: String,
@@ -74,7 +74,7 @@ pub enum TraceFileError {
         /// Its own.
         found: &'static str,
     },
-    /// The reference measures another quantity.
+    /// The reference is of another quantity.
     #[error(
         "{header}: column `{found}`: expected a reference in `{expected}`, as the calibration has it, found `{found}`"
     )]
@@ -110,7 +110,7 @@ impl TraceFile {
         }
     }
 
-    /// Rows with `from_s <= time_s < until_s`, as far as these are given.
+    /// Returns the rows with `from_s <= time_s < until_s`, as far as these are given.
     #[must_use]
     pub fn between(&self, from_s: Option<f64>, until_s: Option<f64>) -> Range<usize> {
         let row_at = |time_s: f64| self.trace.time_s.partition_point(|earlier_s| *earlier_s < time_s);
@@ -135,7 +135,7 @@ impl TraceFile {
     /// Moves a reference that is late by `lag_s`.
     ///
     /// # Errors
-    /// There is no reference, or a row is not as it must be.
+    /// If there is no reference, or a row is invalid.
     pub fn move_reference(&mut self, lag_s: f64) -> Result<(), TraceFileError> {
         let samples = self.samples()?;
         let moved = aligned(&samples, lag_s);
@@ -152,7 +152,7 @@ impl TraceFile {
     /// Returns it in the form that calibration takes.
     ///
     /// # Errors
-    /// There is no reference, or a row is not as it must be.
+    /// If there is no reference, or a row is invalid.
     pub fn samples(&self) -> Result<Samples<'_>, TraceFileError> {
         let Some(reference) = &self.trace.reference else {
             return Err(TraceFileError::NoReference { header: self.header.clone() });
@@ -165,7 +165,7 @@ impl TraceFile {
         samples.map_err(|error| TraceFileError::Samples { name: self.name.clone(), error })
     }
 
-    /// Returns these samples of it with its file, units, clock and joint, as far as it says them.
+    /// Returns samples of it, with its file, units, clock and joint, as far as it contains them.
     fn recording<'a>(&'a self, samples: &Samples<'a>) -> Result<Recording<'a>, Error> {
         let metadata = &self.trace.metadata;
         let mut one = Recording::new(samples.time_s(), samples.reading(), samples.strain())?;
@@ -181,7 +181,7 @@ impl TraceFile {
         Ok(self.joint().map_or(one, |joint| one.on_joint(joint)))
     }
 
-    /// Time, s, and reading of a row.
+    /// Returns time, s, and reading of a row.
     #[must_use]
     pub fn reading(&self, row: usize) -> (f64, Reading) {
         let (time_s, value) = (self.trace.time_s[row], self.trace.readings.values[row]);
@@ -191,7 +191,7 @@ impl TraceFile {
         (time_s, Reading { value, sd, saturated })
     }
 
-    /// The reference in a row; NaN where it is missing.
+    /// Returns the reference in a row; NaN if it is missing.
     #[must_use]
     pub fn truth(&self, row: usize) -> f64 {
         let value = self.trace.reference.as_ref().and_then(|reference| reference.values.get(row));
@@ -205,12 +205,12 @@ impl TraceFile {
         (time_s, reading, self.truth(row))
     }
 
-    /// Standard deviations of the reference; empty if it is exact.
+    /// Returns the standard deviations of the reference; empty if it is exact.
     fn reference_sd(&self) -> &[f64] {
         self.trace.reference.as_ref().map_or(&[], |reference| &reference.sd)
     }
 
-    /// Quantity of the reference.
+    /// Returns the quantity of the reference.
     #[must_use]
     pub fn quantity(&self) -> Option<Quantity> {
         self.trace.reference.as_ref().map(|reference| match reference.quantity {
@@ -219,13 +219,13 @@ impl TraceFile {
         })
     }
 
-    /// Unit of the readings.
+    /// Returns the unit of the readings.
     #[must_use]
     pub const fn unit(&self) -> ReadingUnit {
         unit(self.trace.readings.kind)
     }
 
-    /// The joint that its metadata describe.
+    /// Returns the joint that its metadata describe.
     #[must_use]
     pub fn joint(&self) -> Option<JointParams> {
         joint(&self.trace.metadata)
@@ -234,15 +234,15 @@ impl TraceFile {
     /// Refuses readings in another unit than the sensor's.
     ///
     /// # Errors
-    /// They are.
+    /// If they are.
     pub fn check_unit(&self, expected: ReadingUnit) -> Result<(), TraceFileError> {
         check_unit(&self.header, self.trace.readings.kind, expected)
     }
 
-    /// Refuses a reference that measures another quantity than the sensor's.
+    /// Refuses a reference of another quantity than the sensor's.
     ///
     /// # Errors
-    /// It does.
+    /// If it is.
     pub fn check_quantity(&self, expected: Quantity) -> Result<(), TraceFileError> {
         match self.quantity() {
             Some(found) if found != expected => Err(TraceFileError::Quantity {
@@ -269,26 +269,26 @@ pub fn check_alike(recordings: &[TraceFile]) -> Result<(), TraceFileError> {
     Ok(())
 }
 
-/// Samples of recordings, with what is known of each.
+/// Returns the recordings of these samples, with their metadata.
 ///
 /// # Errors
-/// A row is not as it must be.
+/// If a row is invalid.
 pub fn known_recordings<'a>(recordings: &'a [TraceFile], samples: &[Samples<'a>]) -> Result<Vec<Recording<'a>>, Error> {
     recordings.iter().zip(samples).map(|(recording, samples)| recording.recording(samples)).collect()
 }
 
-/// Returns the name of a file without its path, which is the machine's own business.
+/// Returns the name of a file without its path, which is private to the machine.
 fn file_name(path: &str) -> &str {
     Path::new(path).file_name().and_then(|name| name.to_str()).unwrap_or(path)
 }
 
-/// Returns the name, in messages, of the header of a recording of which no row has been read yet.
+/// Returns the name, in messages, of the header of a recording whose rows have not been read yet.
 #[must_use]
 pub fn header(file: &str, line: u64) -> String {
     if line == 0 { file.to_owned() } else { format!("{file}:{line}") }
 }
 
-/// The joint that metadata describe.
+/// Returns the joint that metadata describe.
 #[must_use]
 pub fn joint(metadata: &Metadata) -> Option<JointParams> {
     metadata.joint.map(|joint| JointParams {
@@ -298,13 +298,13 @@ pub fn joint(metadata: &Metadata) -> Option<JointParams> {
     })
 }
 
-/// A reading of a trace as a filter takes it.
+/// Converts a reading of a trace to one for a filter.
 #[must_use]
 pub fn reading(reading: &TraceReading) -> Reading {
     Reading { value: reading.value, sd: reading.sd_ohm.unwrap_or(0.0), saturated: reading.saturated }
 }
 
-/// Unit of readings.
+/// Returns the unit of readings.
 const fn unit(kind: ReadingKind) -> ReadingUnit {
     match kind {
         ReadingKind::Ohm => ReadingUnit::Ohm,
@@ -312,7 +312,7 @@ const fn unit(kind: ReadingKind) -> ReadingUnit {
     }
 }
 
-/// The column that readings of a unit stand in.
+/// Returns the name of the column with readings of a unit.
 #[must_use]
 pub const fn reading_column(unit: ReadingUnit) -> &'static str {
     match unit {
@@ -324,7 +324,7 @@ pub const fn reading_column(unit: ReadingUnit) -> &'static str {
 /// Refuses readings in another unit than the sensor's.
 ///
 /// # Errors
-/// They are.
+/// If they are.
 pub fn check_unit(header: &str, found: ReadingKind, expected: ReadingUnit) -> Result<(), TraceFileError> {
     let found = unit(found);
     if found == expected {
@@ -334,7 +334,7 @@ pub fn check_unit(header: &str, found: ReadingKind, expected: ReadingUnit) -> Re
     Err(TraceFileError::Unit { header: header.to_owned(), expected, found })
 }
 
-/// A doubt in the words of the command line, with the names of its recordings.
+/// Formats a doubt for the command line, with the names of its recordings.
 pub fn doubt_text(doubt: &CalibrationDoubt, recordings: &[TraceFile]) -> String {
     let file = |place: usize| &recordings[place];
     let places = doubt.recordings();
@@ -346,7 +346,7 @@ pub fn doubt_text(doubt: &CalibrationDoubt, recordings: &[TraceFile]) -> String 
     names + &doubt.text(Interface::CommandLine)
 }
 
-/// Lists the rows that take no part in a calibration.
+/// Lists the rows that are excluded from a calibration.
 pub fn distrusted_rows(rows: &[Distrusted], recordings: &[TraceFile]) -> Vec<String> {
     let line = |one: &Distrusted| {
         let file = &recordings[one.recording];
@@ -356,7 +356,7 @@ pub fn distrusted_rows(rows: &[Distrusted], recordings: &[TraceFile]) -> Vec<Str
     rows.iter().map(line).collect()
 }
 
-/// Lists the first of them, and how many more there are.
+/// Lists the first of them, and the number of the others.
 pub fn first_distrusted_rows(rows: &[Distrusted], recordings: &[TraceFile]) -> Vec<String> {
     let (first, more) = rows.split_at(rows.len().min(NAMED_ROWS));
     let rest = (!more.is_empty()).then(|| format!("{} more rows are left out; --explain names all", more.len()));

@@ -1,15 +1,15 @@
 """From the resistance of a soft, stretchable strain sensor to strain, with an honest error bar.
 
-A :class:`Sensor` is what a calibration knows: made by :func:`calibrate` of recordings with known strain, or read from a
-``sensor.toml``. It filters and smooths recordings, and makes filters for readings as they come.
+A :class:`Sensor` holds the result of a calibration: it is made by :func:`calibrate` from recordings with known strain, or read
+from a ``sensor.toml``. It filters and smooths recordings, and creates filters for live readings.
 
 >>> import ohmstrain as oh
 >>> sensor = oh.calibrate([bench])                    # doctest: +SKIP
 >>> estimates = sensor.smooth(recording)              # doctest: +SKIP
 
 Recordings are tables: pandas, polars or pyarrow, anything else with the Arrow C stream interface, or a dict of arrays. Their
-columns are those of a trace CSV: ``time_s`` or ``time_us``; ``resistance_ohm``, ``resistance_ratio`` or ``adc``; and, where
-the strain is known, ``strain``, ``displacement_mm`` or ``angle_deg``. What is missing is null or NaN.
+columns are those of a trace CSV: ``time_s`` or ``time_us``; ``resistance_ohm``, ``resistance_ratio`` or ``adc``; and, if
+the strain is known, ``strain``, ``displacement_mm`` or ``angle_deg``. Missing values are null or NaN.
 """
 
 from . import plot

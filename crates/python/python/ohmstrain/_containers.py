@@ -14,16 +14,16 @@ import pyarrow as pa
 
 from . import _core, _tables
 
-#: More columns of one array are a picture or a matrix, not readings side by side.
+#: Largest number of columns of an array; with more it is a picture or a matrix, not readings side by side.
 _MOST_COLUMNS = 256
-#: Stamps that are farther from the clock of the file, ns, are of another clock.
+#: Largest distance of stamps from the clock of the file, ns; beyond it they belong to another clock.
 _FARTHEST_NS = 10**15
 
 
 def table(path: str, picked: Mapping[str, Any] | None, part: str | None) -> pa.Table | None:
-    """Columns of a container, all of one length; None of a file that is none.
+    """Return the columns of a container, all of one length; None for any other file.
 
-    ``picked`` are columns by role, ``part`` is a group of HDF5 or a topic.
+    ``picked`` are columns by role, ``part`` is an HDF5 group or a topic.
     """
     reader = _reader(path)
     if reader is None:
@@ -31,7 +31,7 @@ def table(path: str, picked: Mapping[str, Any] | None, part: str | None) -> pa.T
     try:
         arrays = reader(path, part)
     except (_core.OhmstrainError, OSError) as error:
-        # h5py says by an OSError that a file is none of its own.
+        # h5py raises an OSError for a file of another kind.
         if isinstance(error, FileNotFoundError) or isinstance(error, _core.OhmstrainError):
             raise
         raise _error(f"cannot be read: {error}") from error
@@ -55,7 +55,7 @@ def table(path: str, picked: Mapping[str, Any] | None, part: str | None) -> pa.T
 
 
 def _arrow(path: str) -> pa.Table | None:
-    """Feather, and Parquet with times that the importer does not take for what they are."""
+    """Read Feather, and Parquet with times that the importer would misread."""
     if os.path.isdir(path):
         return None
     with open(path, "rb") as file:
@@ -74,12 +74,12 @@ def _arrow(path: str) -> pa.Table | None:
 
 
 def _is_odd(field: pa.Field) -> bool:
-    """A duration, or a moment that is called a number."""
+    """True for a duration, or a timestamp with the name of a numeric column."""
     return pa.types.is_duration(field.type) or (pa.types.is_timestamp(field.type) and field.name in _tables.TIMES)
 
 
 def _plain_times(table: pa.Table) -> pa.Table:
-    """Durations as seconds, and moments by a name that says no unit."""
+    """Convert durations to seconds, and rename timestamps to names without a unit."""
     for place, field in enumerate(table.schema):
         if pa.types.is_duration(field.type):
             seconds = pa.array(_tables.seconds(table.column(place), field, _tables.Origin(0)))
@@ -119,7 +119,7 @@ def _needed(module: str, package: str, what: str) -> Any:
 
 
 def _arrays(name: str, value: Any) -> Iterator[tuple[str, np.ndarray]]:
-    """Columns of numbers in an array, or in a struct of arrays."""
+    """Yield the columns of numbers in an array, or in a struct of arrays."""
     value = np.asarray(value)
     if value.dtype.names:
         fields = value.reshape(-1)
@@ -131,7 +131,7 @@ def _arrays(name: str, value: Any) -> Iterator[tuple[str, np.ndarray]]:
         return
     if value.dtype.kind not in "biufM":
         return
-    # Arrow knows neither the other order of bytes nor all of numpy's numbers.
+    # Arrow supports neither the other byte order nor all of numpy's numbers.
     plain = {"?": "i1", "e": "f4", "g": "f8"}.get(value.dtype.char, value.dtype.newbyteorder("="))
     value = np.squeeze(value.astype(plain, copy=False))
     if value.ndim == 1 and len(value) > 1:
@@ -143,7 +143,7 @@ def _arrays(name: str, value: Any) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def _below(part: str | None, name: str, separator: str) -> str | None:
-    """A name without the part that was asked for; None if it is not below it."""
+    """Return a name relative to the requested part; None if it is not below it."""
     if part is None:
         return name
     inner = part.strip(separator) + separator
@@ -190,7 +190,7 @@ class _Topic:
                 stamp_ns += int(value) * (1 if "n" in name[13:] else 10**9)  # sec or secs; nanosec, nsec or nsecs
             elif not name.startswith("header."):
                 column = self.cells.setdefault(name, [])
-                # What earlier messages lack is missing.
+                # Values absent from earlier messages are missing.
                 column.extend([np.nan] * (len(self.logged) - 1 - len(column)))
                 column.append(value)
         self.stamps.append(stamp_ns or None)
@@ -200,14 +200,14 @@ class _Topic:
         times = self.logged if None in self.stamps else self.stamps
         zero = start_ns if abs(times[0] - start_ns) < _FARTHEST_NS else times[0]
         short = topic.rsplit("/", 1)[-1]
-        # A message that is one number is called by its topic.
+        # A message with a single number gets the name of its topic.
         named = {short + name[4:] if name == "data" or name.startswith("data[") else name: cells for name, cells in self.cells.items()}
         full = {name: np.array(cells + [np.nan] * (rows - len(cells))) for name, cells in named.items()}
         return {"time_s": np.array([time - zero for time in times]) / 1e9, **full}
 
 
 def _fields(name: str, value: Any) -> Iterator[tuple[str, float]]:
-    """Numbers in a message, by dotted names, of arrays counted from 1."""
+    """Yield the numbers in a message by dotted names; elements of arrays are counted from 1."""
     if isinstance(value, (bool, int, float, np.number)):
         yield name, value
     elif isinstance(value, (list, tuple, np.ndarray)):

@@ -3,7 +3,7 @@ from typing import Any
 MADE_BY: str
 
 class OhmstrainError(ValueError):
-    """What is wrong with a table, a sensor file or an option."""
+    """An error in a table, a sensor file or an option."""
 
     file: str | None
     row: int | None

@@ -30,19 +30,19 @@ class Scores:
 
     @classmethod
     def of_json(cls, text: str) -> Scores:
-        """What the library says."""
+        """Parse the scores that the library returns."""
         known = json.loads(text)
         return cls(**{name: known.get(name) for name in cls.__dataclass_fields__})
 
 
 class Evaluation:
-    """Scores by what is scored: ``filter``, ``smoother``, ``static_cubic``, and further baselines after a split."""
+    """Scores by the name of the estimate: ``filter``, ``smoother``, ``static_cubic``, and further baselines after a split."""
 
     def __init__(self, scored: Iterable[tuple[str, str]], name: str | None, split: float | None) -> None:
         self.scores = {of: Scores.of_json(text) for of, text in scored}
         self.name = name
         self.split = split
-        #: The sensor that was calibrated for a split.
+        #: The sensor calibrated for a split.
         self.sensor: Sensor | None = None
 
     def __getitem__(self, of: str) -> Scores:
@@ -79,7 +79,7 @@ def evaluate(
     recording
         A table with a reference.
     splits
-        Shares of the rows to calibrate on, between 0 and 1.
+        Shares of the rows used for calibration, between 0 and 1.
     estimator : str
         As in :func:`calibrate`.
 

@@ -1,4 +1,4 @@
-"""Several channels that see one strain."""
+"""Several channels that measure one strain."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ._sensor import Sensor
 
 
 class FusedSensor:
-    """Several sensors that see one strain, as ``ohmstrain calibrate`` makes them of a recording with a column of readings for each.
+    """Several sensors that measure one strain, as ``ohmstrain calibrate`` makes them from a recording with a column of readings each.
 
     >>> knee = oh.FusedSensor.load(["knee-knit1.toml", "knee-knit2.toml"], "knee-fusion.toml")  # doctest: +SKIP
     >>> knee.filter().step(0.0, [1.02, 1.31])["strain"]  # doctest: +SKIP
@@ -30,11 +30,11 @@ class FusedSensor:
         return cls([Sensor.load(path) for path in sensors], text, os.fspath(fusion))
 
     def to_toml(self) -> str:
-        """The text of the fusion file."""
+        """Return the text of the fusion file."""
         return self._core.to_toml()
 
     def filter(self) -> FusedFilter:
-        """A running filter of all channels."""
+        """Create a running filter of all channels."""
         return FusedFilter(self._core.filter())
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -48,10 +48,10 @@ class FusedFilter:
         self._core = core
 
     def step(self, time_s: float, readings: Sequence[float | None]) -> dict[str, Any]:
-        """Take a reading of each channel at a time, s; a missing one is None or NaN.
+        """Take a reading of each channel at a time, s; a missing reading is None or NaN.
 
-        ``strain`` (or degrees, if the sensors were calibrated on an angle) with ``strain_sd``; ``angle_deg`` and ``angle_sd`` of
-        sensors on a joint; ``faulty``, the place of the channel that disagrees with all others, which was left out; ``is_unlike``, if the
-        readings together are unlike any of the calibration. An error leaves the filter as it was.
+        The result contains ``strain`` (in degrees if the sensors were calibrated on an angle) with ``strain_sd``; ``angle_deg`` and
+        ``angle_sd`` for sensors on a joint; ``faulty``, the index of a channel that disagrees with all others and was left out; and
+        ``is_unlike``, true if the readings together are unlike any in the calibration. An error leaves the filter as it was.
         """
         return self._core.step(time_s, list(readings))

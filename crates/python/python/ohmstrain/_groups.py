@@ -1,4 +1,4 @@
-"""Many recordings in one table: the same work for every engine that groups rows and hands each group over as Arrow.
+"""Many recordings in one table: common code for every engine that groups rows and passes each group on as Arrow.
 
 Nothing here schedules, shuffles or stores: an engine calls a :class:`Work` with the rows of one recording.
 """
@@ -15,17 +15,17 @@ import pyarrow.compute as pc
 from . import _core, _tables
 from ._sensor import Sensor, _choices, _options, _split
 
-#: Column that says what is wrong with a recording; null in rows of good ones.
+#: Column with the error of a recording; null in rows of good recordings.
 ERROR = "error"
-#: Column with what a notebook warns of, in the first row of a recording; null where there is nothing.
+#: Column with the warnings about a recording, in its first row; null otherwise.
 WARNINGS = "warnings"
 
-#: What ``evaluate`` and ``calibrate`` say of each recording or sensor, beside its keys.
+#: Columns that ``evaluate`` and ``calibrate`` return for each recording or sensor, beside its keys.
 SCORES = ("n", "filter_percent_fs", "smoother_percent_fs", "static_cubic_percent_fs", "coverage_95")
 
 
 class Work:
-    """What is done with the rows of one group. It can be sent to other processes: sensors go as text."""
+    """Task for the rows of one group. It can be sent to other processes, with sensors as text."""
 
     def __init__(self, task: str, by: Iterable[str], sensors: Any = None, **arguments: Any) -> None:
         self.task = task
@@ -35,7 +35,7 @@ class Work:
         self.about, self.options = _split(arguments)
         self.texts = None if task == "calibrate" else _texts(sensors)
         self._made: dict[Any, Sensor] = {}
-        # Wrong options are an error of this call, not of ten thousand groups.
+        # Invalid options raise an error here, instead of one in each of ten thousand groups.
         if task == "calibrate":
             _choices(**self.options)
         else:
@@ -50,9 +50,9 @@ class Work:
         return {**self.__dict__, "_made": {}}
 
     def check(self, kinds: Mapping[str, Any]) -> None:
-        """Refuse a table without the columns that are needed, or with other kinds of them, before the job starts.
+        """Refuse a table that lacks needed columns, or has them in other types, before the job starts.
 
-        Kinds are Arrow's, or Python's ``object`` where an engine knows no such kind; None is not looked at.
+        Types are Arrow's, or Python's ``object`` if an engine has no such type; None is not checked.
         """
         names = list(kinds)
         for key in self.by:
@@ -72,12 +72,12 @@ class Work:
             raise _core.OhmstrainError(f"expected readings as the sensors', `{self.reading}`, found `{','.join(names)}`")
 
     def needed(self, names: Iterable[str]) -> list[str]:
-        """The columns that are handed over; nothing else travels, of a reference only where it is asked for."""
+        """Return the columns that are passed on; a reference only if the task needs it."""
         known = _tables.COLUMNS if self.task in ("evaluate", "calibrate") else _tables.READINGS
         return [name for name in names if name in self.by or name in known]
 
     def schema(self, keys: Mapping[str, pa.DataType]) -> pa.Schema:
-        """Columns of the result: keys, what the task gives, warnings and the error."""
+        """Return the schema of the result: keys, columns of the task, warnings and the error."""
         fields = [pa.field(key, keys[key]) for key in self.by]
         if self.task in ("filter", "smooth"):
             fields += [pa.field(name, pa.string() if name == "flags" else pa.float64()) for name in self.columns]
@@ -87,17 +87,17 @@ class Work:
         return pa.schema([*fields, pa.field(WARNINGS, pa.string()), pa.field(ERROR, pa.string())])
 
     def __call__(self, group: pa.Table) -> pa.Table:
-        """The rows that come of one group; of a bad one, a row that says why."""
+        """Return the resulting rows of one group; for a bad group, one row with the error."""
         keys = {key: group[key][0] for key in self.by}
         schema = self.schema({key: group.schema.field(key).type for key in self.by})
         try:
             columns = self._columns(keys, in_order(group))
-        except Exception as error:  # noqa: BLE001: whatever it is, it is this recording's alone.
+        except Exception as error:  # noqa: BLE001: any error concerns this recording only.
             columns = _failed(error)
         return _rows(keys, columns, schema)
 
     def stream(self, batches: Iterator[pa.RecordBatch]) -> Iterator[pa.RecordBatch]:
-        """The same of a group that comes in pieces, in order of time: one piece is held at a time. For ``filter``."""
+        """Do the same for a group in pieces, in order of time, with one piece in memory at a time. For ``filter``."""
         live = None
         for batch in batches:
             group = pa.Table.from_batches([batch])
@@ -109,7 +109,7 @@ class Work:
                 yield from _rows(keys, _estimates(*live.run(recording, self.about)), schema).combine_chunks().to_batches()
             except Exception as error:  # noqa: BLE001: as above
                 yield from _rows(keys, _failed(error), schema).to_batches()
-                for _ in batches:  # The rest of a bad recording is passed over.
+                for _ in batches:  # The rest of a bad recording is skipped.
                     pass
                 return
 
@@ -139,7 +139,7 @@ class Work:
 
 
 def _rows(keys: Mapping[str, Any], columns: Mapping[str, Any], schema: pa.Schema) -> pa.Table:
-    """Rows of the result: keys repeated, null where there is no column."""
+    """Return rows of the result, with repeated keys, and null for absent columns."""
     rows = len(next(iter(columns.values())))
     found = {**{name: pa.repeat(key, rows) for name, key in keys.items()}, **columns}
     return pa.table([found[f.name] if f.name in found else pa.nulls(rows, f.type) for f in schema], schema=schema)
@@ -155,14 +155,14 @@ def _failed(error: Exception) -> dict[str, Any]:
 
 
 def _first(doubts: list[str], rows: int) -> Any:
-    """Doubts in the first of so many rows."""
+    """Return a column with the doubts in the first of ``rows`` rows."""
     if not doubts:
         return pa.nulls(rows, pa.string())
     return pa.concat_arrays([pa.array(["; ".join(doubts)]), pa.nulls(rows - 1, pa.string())])
 
 
 def in_order(group: pa.Table) -> pa.Table:
-    """Rows in order of time: no engine promises an order inside a group."""
+    """Sort rows by time, since no engine guarantees an order within a group."""
     time = "time_s" if "time_s" in group.column_names else "time_us"
     times = group[time].combine_chunks()
     if len(times) > 1 and not pc.all(pc.less_equal(times[:-1], times[1:])).as_py():
@@ -188,7 +188,7 @@ def _figures(filtered: Any, smoothed: Any, cubic: Any) -> dict[str, Any]:
 
 
 def _texts(sensors: Any) -> dict[Any, str]:
-    """Sensors by the first key, or one for all under None; as text."""
+    """Return sensors as text, by the first key, or one for all under None."""
     text = lambda sensor: sensor.to_toml() if isinstance(sensor, Sensor) else str(sensor)  # noqa: E731
     if isinstance(sensors, Mapping):
         if not sensors:

@@ -1,4 +1,4 @@
-"""Files in."""
+"""Reading of files."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ import pyarrow as pa
 from . import _containers, _core, _tables
 from ._sensor import _warn
 
-#: Arguments that take a value per role, and lists; the importer's messages name them as flags.
+#: Arguments that take a value per role, and those that take lists; the importer's messages contain their flags.
 _BY_ROLE = {"column": "columns", "unit": "units", "zero": "zero", "where": "where"}
 _LISTS = ("magnitude", "drop_zeros", "missing")
-#: Values that stand for numbers in messages.
+#: Placeholders of numbers in messages.
 _NUMBERS = ("HZ", "MM", "N", "S", "SECONDS")
 _FLAG = re.compile(r"--([a-z]+(?:-[a-z]+)*)(?: ((?:'[^']*'|\\'|[^\s'\\])+))?")
 _SWITCHES = ("fold-polarity",)
-#: Flags of the command line alone.
+#: Flags that exist on the command line only.
 _COMMANDS = {"split-recordings": "`ohmstrain import --split-recordings`"}
 
 
@@ -49,42 +49,42 @@ def read(
     strain_unit: str | None = None,
     resistance_unit: str | None = None,
 ) -> pa.Table:
-    """Read a recording: a trace CSV, as ``ohmstrain import`` writes it, or a lab's files, as ``ohmstrain import`` reads them.
+    """Read a recording from a trace CSV, as ``ohmstrain import`` writes it, or from a lab's files, as ``ohmstrain import`` reads them.
 
     Parameters
     ----------
     *paths
-        Files of one recording: text, XLSX, Parquet, each perhaps in gzip. MATLAB files are read by scipy, those of version 7.3 and other
-        HDF5 by h5py, ROS 1 and ROS 2 bags by rosbags, MCAP by mcap (of ROS 2 with mcap-ros2-support): where the package is missing the error
-        names it.
+        Files of one recording: text, XLSX, Parquet, each optionally in gzip. MATLAB files are read by scipy, those of version 7.3 and
+        other HDF5 by h5py, ROS 1 and ROS 2 bags by rosbags, MCAP by mcap (that of ROS 2 with mcap-ros2-support). If the package is
+        missing, the error names it.
     columns : dict
         Columns by role, by name or number from 1: ``{"time": "Time (s)", "resistance": 3, "angle": None}``; in a second file
         ``"2:Position"``. Roles: time, reference-time, resistance, ratio, adc, strain, displacement, angle, temperature.
     units : dict
-        Units by role: ``{"time": "ms", "resistance": "kohm", "strain": "percent"}``; of a reference in volts its scale, ``"4mm/V"``.
+        Units by role: ``{"time": "ms", "resistance": "kohm", "strain": "percent"}``; for a reference in volts its scale, ``"4mm/V"``.
     decimal : str or dict
         Decimal mark, or marks by file, counted from 1.
     skip : int or dict
-        Lines above header and data.
+        Number of lines above header and data.
     sheet : str
         Sheet of a workbook, file in a zip archive, group of HDF5, struct of a MATLAB file, or topic of a bag.
     where : dict
-        Rows in which a value stands in a column: ``{"trial": 2}``.
+        Selects rows by the value of a column: ``{"trial": 2}``.
     recording : int
-        Which recording, counted from 1, of a file with several: where the clock begins anew, or a column ``trial``, ``run`` or so has
-        another value.
+        Number of the recording, counted from 1, in a file with several. A new one begins where the clock restarts, or where the value
+        of a column such as ``trial`` or ``run`` changes.
     missing : list of str
-        Texts that stand for missing values, besides the usual ones.
+        Texts that represent missing values, besides the usual ones.
     magnitude, drop_zeros : list of str
         Roles whose sign is arbitrary; roles in which a lone 0 is a missing value.
     zero : dict
         Reference at rest by role, in the unit of its column.
     fold_polarity : bool
-        Means of neighbouring readings, taken with the current's sign changed.
+        Average neighbouring readings that were taken with opposite signs of the current.
     align : str or float
         Clocks of readings and reference: ``motion``, ``none``, or the seconds to add to the reference's.
     rate_hz : float
-        Rows per second, where no column is a time.
+        Rows per second, if no column is a time.
     preset : str
         A known layout: ``electromech-stretcher``.
     gauge_length_mm, front_end, joint
@@ -95,14 +95,14 @@ def read(
     Returns
     -------
     pyarrow.Table
-        Columns ``time_s``; ``resistance_ohm``, ``resistance_ratio`` or ``adc``; ``strain`` or ``angle_deg``, and ``temperature_c``, if they are
-        there. It knows its name, front end, joint and units: ``calibrate``, ``filter`` and ``smooth`` need not be told again. What
-        ``.to_pandas()`` makes of it does not.
+        Columns ``time_s``; ``resistance_ohm``, ``resistance_ratio`` or ``adc``; and, if the files have them, ``strain`` or ``angle_deg``
+        and ``temperature_c``. Its metadata contain name, front end, joint and units, which ``calibrate``, ``filter`` and ``smooth`` then
+        use. ``.to_pandas()`` drops the metadata.
 
     Raises
     ------
     OhmstrainError
-        Names the argument that answers what a file leaves open.
+        Names the argument that answers an open question about a file.
     """
     if not paths:
         raise TypeError("expected at least one path")
@@ -150,7 +150,7 @@ def read(
 
 
 def _readable(name: str, place: int, folder: str, said: dict[str, Any], columns: Mapping[str, Any] | None) -> str:
-    """The file itself; of a container a Parquet file of its columns."""
+    """Return the file itself; for a container, a Parquet file with its columns."""
     try:
         found = _containers.table(name, columns, said["sheet"])
     except _core.OhmstrainError as error:
@@ -178,14 +178,14 @@ def _per_file(given: Any) -> list[str]:
 
 
 def as_arguments(message: str) -> str:
-    """A message of the importer with arguments in the place of flags: ``units={"strain": "percent"}``."""
+    """Replace the flags in a message of the importer by arguments: ``units={"strain": "percent"}``."""
     out, last = [], 0
     flags = list(_FLAG.finditer(message))
     while flags:
         flag = flags.pop(0)
         out.append(message[last : flag.start()])
         text, rest = _argument(flag)
-        # Flags side by side that are one argument.
+        # Adjacent flags that form one argument.
         together = [text]
         while flags and not rest and message[flag.end() : flags[0].start()] == " " and flags[0][1] == flag[1] in _BY_ROLE:
             flag = flags.pop(0)
@@ -202,7 +202,7 @@ def _merged(arguments: list[str]) -> str:
 
 
 def _argument(flag: re.Match[str]) -> tuple[str, str]:
-    """A flag as an argument, and what stands behind its value."""
+    """Return a flag as an argument, and the text after its value."""
     name, word = flag[1], flag[2]
     key = name.replace("-", "_")
     if name in _COMMANDS:
@@ -211,7 +211,7 @@ def _argument(flag: re.Match[str]) -> tuple[str, str]:
         return (f"{key}=True", "") if name in _SWITCHES else (key, "")
     if name in _SWITCHES:
         return f"{key}=True", f" {word}"
-    # A mark after an unquoted word belongs to the sentence.
+    # Punctuation after an unquoted word belongs to the sentence.
     bare = word if name == "decimal" else word.rstrip(":;,") or word
     value, rest = "".join(shlex.split(bare)), word[len(bare) :]
     role, is_pair, of_role = value.partition("=")

@@ -15,11 +15,11 @@ from . import _core, _tables
 
 
 class OhmstrainWarning(UserWarning):
-    """What casts doubt on a result: a use outside of what the calibration has seen, rows that were left out."""
+    """A doubt about a result: a use outside the calibrated range, or rows that were left out."""
 
 
 def _warn(messages: Iterable[str], depth: int = 1) -> None:
-    """Warn at the line of the user, so many calls above the one that asks for it."""
+    """Warn at the user's line, ``depth`` calls above the caller."""
     for message in messages:
         warnings.warn(message, OhmstrainWarning, stacklevel=depth + 2)
 
@@ -82,14 +82,14 @@ def _choices(
 
 
 def _split(arguments: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Arguments about the recording, and those about the work."""
+    """Separate arguments about the recording from those about the task."""
     names = _about.__code__.co_varnames[: _about.__code__.co_argcount]
     about = {name: arguments.pop(name) for name in names if name in arguments}
     return _about(**about), arguments
 
 
 def _write(path: str | os.PathLike[str], text: str) -> None:
-    """Whole or not at all."""
+    """Write a file, whole or not at all."""
     target = Path(path)
     with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=target.parent, delete=False) as draft:
         draft.write(text)
@@ -98,7 +98,7 @@ def _write(path: str | os.PathLike[str], text: str) -> None:
 
 
 class Prior:
-    """What calibrated sensors of one make have in common: with it a short motion calibrates the next one."""
+    """Common properties of calibrated sensors of one make, with which a short motion calibrates the next one."""
 
     def __init__(self, text: str, file: str | None = None) -> None:
         _core.check_prior(text, file)
@@ -115,7 +115,7 @@ class Prior:
         return cls(Path(path).read_text(encoding="utf-8"), os.fspath(path))
 
     def to_toml(self) -> str:
-        """The text of its ``prior.toml``."""
+        """Return the text of its ``prior.toml``."""
         return self._text
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -137,18 +137,18 @@ class Sensor:
         Raises
         ------
         OhmstrainError
-            With file, line and column, if it is none or has a number that no sensor can have.
+            With file, line and column, if it is not a sensor or has a number out of its range.
         """
         name = os.fspath(path)
         return cls(_core.Sensor.from_toml(Path(path).read_text(encoding="utf-8"), file=name), name)
 
     @classmethod
     def from_toml(cls, text: str) -> Sensor:
-        """Take the text of a ``sensor.toml``."""
+        """Parse the text of a ``sensor.toml``."""
         return cls(_core.Sensor.from_toml(text))
 
     def to_toml(self) -> str:
-        """The text of its ``sensor.toml``."""
+        """Return the text of its ``sensor.toml``."""
         return self._core.to_toml()
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -158,12 +158,12 @@ class Sensor:
 
     @property
     def params(self) -> dict[str, Any]:
-        """All its numbers, as they stand in ``sensor.toml``."""
+        """All its numbers, as in ``sensor.toml``."""
         return json.loads(self._core.json())
 
     @property
     def findings(self) -> dict[str, Any] | None:
-        """What the calibration is worth on quarters left out, what limits it, what to record next; if that could be told."""
+        """Errors on held-out quarters, what limits them, and what to record next; None if they could not be measured."""
         return self.params.get("findings")
 
     @property
@@ -194,44 +194,44 @@ class Sensor:
         resume: str | os.PathLike[str] | None = None,
         **options: Any,
     ) -> Any:
-        """Estimates of a recording, each from the readings up to it; or, without one, a filter for readings as they come.
+        """Filter a recording, each row from the readings up to it; or, without a recording, create a filter for live readings.
 
         Parameters
         ----------
         recording
-            A table. Times are ``time_s`` or ``time_us``, or dates and times (of the first row is 0 s) or durations, in a column or a
-            pandas index. If there is none, a :class:`LiveFilter` is returned, or a :class:`LaggedFilter`.
+            A table. Times are ``time_s`` or ``time_us``, or dates and times (with the first row at 0 s) or durations, in a column or a
+            pandas index. Without a recording, a :class:`LiveFilter` or a :class:`LaggedFilter` is returned.
         lag_s
-            Wait so many seconds for later readings; for live filters.
+            Delay of the estimates, s, in which later readings are used; for live filters.
         resume
-            Path of a state file, from which a live filter of the same sensor and options goes on: written by its ``save``, or by
-            ``ohmstrain filter --save-state``. It knows R₀ and known strains; what is said here counts from now on.
+            Path of a state file, from which a live filter of the same sensor and options resumes; written by its ``save``, or by
+            ``ohmstrain filter --save-state``. R₀ and known strains come from the state; known strains given here are added.
         estimator : str
             ``auto`` (the sensor's choice), ``corrected``, ``ekf``, ``ukf``, ``imm``, ``sign-split``, ``hypotheses``.
         correction : bool
-            With the learned correction of the strain, the default.
+            Apply the learned correction of the strain; true by default.
         initial_strain : float
             Strain at the first row, if it is known; the body is at rest there.
         known : list of tuples
-            Strains (or angles) that are known, ``(time_s, strain)`` or ``(time_s, strain, sd)``: of the first row from that
-            time on. What the estimates lack then is known of the rows after it, too (a smoother's: around it).
+            Known strains (or angles), ``(time_s, strain)`` or ``(time_s, strain, sd)``; each applies to the first row at or after
+            its time. The error of the estimate there also corrects later rows (in a smoother, rows before it, too).
         rest_resistance : float or str
-            What the rested, unstretched sensor reads now, or ``calibrated`` for what it read in calibration. Without it
-            R₀ is that too, but follows readings that stay beyond those of the calibration.
+            Present reading of the rested, unstretched sensor, or ``calibrated`` for its reading in calibration. The default is the
+            latter, but R₀ then adapts to readings that stay outside the calibrated range.
         gate : float
-            Turn down readings whose normalised innovation squared is above this, two in a row at most.
+            Reject readings whose normalised innovation squared is above this, at most two in a row.
         influence : str
-            How surprising readings are taken: ``redescending:K`` (``redescending:3`` by default), ``huber:K``,
-            ``student-t:DOF`` or ``none``, as they are.
+            Influence of surprising readings: ``redescending:K`` (``redescending:3`` by default), ``huber:K``, ``student-t:DOF``, or
+            ``none``, which uses them unchanged.
         columns : list of str
-            Columns of the estimates that are wanted, of :attr:`columns`; all by default.
+            Requested columns of the estimates, from :attr:`columns`; all by default.
         name, gauge_length_mm, front_end, joint, strain_unit, resistance_unit
-            What messages call the recording, and what stands above the header of a trace CSV; units are ``fraction`` or
-            ``percent`` and ``ohm`` or ``kohm``. A table of :func:`ohmstrain.read` knows them.
+            Name of the recording in messages, and the metadata above the header of a trace CSV; units are ``fraction`` or
+            ``percent`` and ``ohm`` or ``kohm``. A table of :func:`ohmstrain.read` contains them.
 
         Returns
         -------
-        A table of the recording's kind with the columns of ``estimates.csv``; what is not known is null.
+        A table of the recording's kind with the columns of ``estimates.csv``; unknown values are null.
 
         Raises
         ------
@@ -251,14 +251,14 @@ class Sensor:
         return LaggedFilter(self._core.lagged(_options(**options), lag_s), self, options, lag_s)
 
     def smooth(self, recording: Any, **options: Any) -> Any:
-        """Estimates of a recording, each from all readings.
+        """Smooth a recording: each estimate uses all readings.
 
         Parameters and result are those of :meth:`filter`.
         """
         return self._estimate(self._core.smooth, recording, options)
 
     def evaluate(self, recording: Any, *, from_s: float = float("-inf"), **options: Any) -> Any:
-        """Scores of filter, smoother and static cubic on the rows at ``from_s`` or later; the filter starts at the first.
+        """Score filter, smoother and static cubic on the rows at ``from_s`` or later; the filter starts at the first row.
 
         Returns
         -------
@@ -289,18 +289,18 @@ class Sensor:
             Usual time between two readings, s; by default that of the calibration's recordings.
         budget
             Largest cost, as ``--budget`` takes it: ``lean``, or some of ``board=NAME,instructions=N,flash=BYTES,ram=BYTES``; the first
-            of its candidates that fits is exported. Without it all of the filter is.
+            of its candidates that fits is exported. Without it, the whole filter is.
         prefix
-            What the names of the C code begin with.
+            Prefix of the names in the C code.
 
         Returns
         -------
-        What was promised of the filter, and what it costs on a Cortex-M4F: a table.
+        A table of the filter's expected errors and of its cost on a Cortex-M4F.
 
         Raises
         ------
         OhmstrainError
-            If the filter has no form for a microcontroller, or nothing fits. Then nothing is written.
+            If the filter cannot be exported, or nothing fits. Nothing is written then.
         """
         files, promise, words = self._core.export(target, dt_s, budget, prefix)
         for path, content in files:
@@ -356,7 +356,8 @@ class Sensor:
 class LiveFilter:
     """A running filter: readings in, estimates out. See :meth:`Sensor.filter`.
 
-    ``pickle``, ``copy`` and :meth:`save` keep all that it knows: what goes on from there estimates, to the last digit, what it would have.
+    ``pickle``, ``copy`` and :meth:`save` keep its whole state: a filter that resumes from there gives the same estimates, to the last
+    digit.
     """
 
     def __init__(self, core: _core.LiveFilter, sensor: Sensor, options: Mapping[str, Any]) -> None:
@@ -365,23 +366,23 @@ class LiveFilter:
         self._origin = _tables.Origin()
 
     def step(self, time_s: float, reading: float | None = None) -> dict[str, Any]:
-        """Take the reading at a time, s; a missing one is None or NaN. An error leaves the filter as it was."""
+        """Take the reading at a time, s; a missing reading is None or NaN. An error leaves the filter as it was."""
         return self._core.step(time_s, reading)
 
     def run(self, rows: Any, **about: Any) -> Any:
-        """Take the rows of a table, and go on from the last one with the next: a recording in pieces. Of dates and times the first of
-        the first piece is 0 s.
+        """Take the rows of a table, one piece of a recording; the next call continues after the last row. For dates and times, the
+        first row of the first piece is at 0 s.
         """
         table, doubts = self._core.run(_tables.to_arrow(rows, self._origin), _about(**about))
         _warn(doubts)
         return _tables.converter(rows)(_tables.from_core(table))
 
     def rest_resistance(self, measured: float) -> None:
-        """What the rested, unstretched sensor is found to read from now on."""
+        """Set the reading of the rested, unstretched sensor from now on."""
         self._core.rest_resistance(measured)
 
     def state(self) -> str:
-        """All that the next row depends on, as the text of a state file."""
+        """Return everything that the next row depends on, as the text of a state file."""
         return self._core.store(self._origin.first_ns)
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -393,8 +394,8 @@ class LiveFilter:
 
 
 class LaggedFilter:
-    """A running filter that waits: each row is estimated from the readings up to a fixed lag after it. It is kept as a
-    :class:`LiveFilter` is, with the rows that wait.
+    """A running fixed-lag smoother: each row is estimated from the readings up to a fixed lag after it. It can be stored like a
+    :class:`LiveFilter`, with its pending rows.
     """
 
     def __init__(self, core: _core.LaggedFilter, sensor: Sensor, options: Mapping[str, Any], lag_s: float) -> None:
@@ -402,19 +403,19 @@ class LaggedFilter:
         self._sensor, self._options, self._lag_s = sensor, _of_later(options), lag_s
 
     def step(self, time_s: float, reading: float | None = None) -> list[dict[str, Any]]:
-        """Take a reading; the rows that have become due."""
+        """Take a reading, and return the rows that have become due."""
         return self._core.step(time_s, reading)
 
     def finish(self) -> list[dict[str, Any]]:
-        """The rows that still wait."""
+        """Return the pending rows."""
         return self._core.finish()
 
     def rest_resistance(self, measured: float) -> None:
-        """What the rested, unstretched sensor is found to read from now on."""
+        """Set the reading of the rested, unstretched sensor from now on."""
         self._core.rest_resistance(measured)
 
     def state(self) -> str:
-        """All that the next row depends on, as the text of a state file."""
+        """Return everything that the next row depends on, as the text of a state file."""
         return self._core.store()
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -426,7 +427,7 @@ class LaggedFilter:
 
 
 def _of_later(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Options without what a state knows: the start, R₀ and known strains."""
+    """Return the options without those stored in a state: the start, R₀ and known strains."""
     return {name: value for name, value in options.items() if name not in ("initial_strain", "rest_resistance", "known")}
 
 
@@ -456,32 +457,32 @@ def calibrate(
     Parameters
     ----------
     recordings
-        Tables, each with a reference, or one table; or a dict of tables by the names that messages call them.
+        Tables, each with a reference, or one table; or a dict of tables by their names in messages.
     estimator : str
-        The estimator to calibrate and to make the default; ``auto`` is what the command line does.
+        The estimator that is calibrated and becomes the default; ``auto`` chooses as the command line does.
     branches : int
-        Relaxing branches of the law, 0 to 4, in place of what the filter does best with.
+        Number of relaxing branches of the law, 0 to 4, instead of choosing it by the filter's error.
     gauge : str
         Family of the quasi-static curve: ``auto``, ``polynomial``, ``decaying-exponential`` or ``tunnelling``.
     prior : Prior
-        What other sensors of the make have taught, or the path of a ``prior.toml``: a short motion is enough then. It brings
-        the law's structure; ``branches`` and ``gauge`` do not count.
+        Prior learned from other sensors of the same make, or the path of a ``prior.toml``; a short motion is enough then. The
+        law's structure is the prior's; ``branches`` and ``gauge`` are ignored.
     align : bool
-        Move a reference that is late or early to where the readings say it belongs. Without it, one that is certainly too late is
-        an error, one that may be a warning.
+        Shift a late or early reference to match the readings. Without it, one that is certainly too late is an error, and one that
+        may be too late is a warning.
     gauge_length_mm, front_end, joint, strain_unit, resistance_unit
-        What stands above the header of a trace CSV. Units that are said, ``percent`` or ``fraction`` and ``kohm`` or ``ohm``, are not
-        asked about. A table of :func:`ohmstrain.read` knows them.
+        Metadata above the header of a trace CSV. Units that are given, ``percent`` or ``fraction`` and ``kohm`` or ``ohm``, are not
+        doubted. A table of :func:`ohmstrain.read` contains them.
 
     Returns
     -------
     Sensor
-        The same as ``ohmstrain calibrate`` writes, but for the recordings' names.
+        The same as ``ohmstrain calibrate`` writes, apart from the recordings' names.
 
     Raises
     ------
     OhmstrainError
-        Names recording, row and column; or says what recordings lack.
+        Names recording, row and column, or what the recordings lack.
     """
     if isinstance(recordings, Mapping) and not any(name in _tables.COLUMNS for name in recordings):
         named = list(recordings.items())

@@ -1,4 +1,4 @@
-"""Tables of any kind as Arrow tables, and back."""
+"""Conversion of tables of any kind to Arrow tables, and back."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from . import _core
 
 #: Columns of times.
 TIMES = ("time_s", "time_us")
-#: Columns of readings, and of a recording; others are not handed over.
+#: Columns of readings, and of a recording; others are not passed on.
 READINGS = ("time_s", "time_us", "resistance_ohm", "resistance_ratio", "adc")
 COLUMNS = (*READINGS, "strain", "displacement_mm", "angle_deg")
 
 
 class Origin:
-    """The moment that is 0 s: the first one of a column of dates and times."""
+    """Time of 0 s: the first one in a column of dates and times."""
 
     def __init__(self, first_ns: int | None = None) -> None:
         self.first_ns = first_ns
 
 
 def to_arrow(table: Any, origin: Origin | None = None) -> pa.Table:
-    """The columns of a recording that a table has, without a copy where the table has them as Arrow has them.
+    """Return the columns of a recording in a table, without a copy if they have Arrow's layout.
 
-    Moments become seconds from the origin, or from the first row where there is none; durations become seconds.
+    Timestamps become seconds from the origin, or from the first row without one; durations become seconds.
     """
     refused = TypeError(f"expected a table (pandas, polars, pyarrow) or a dict of arrays, found {type(table).__name__}")
     if isinstance(table, (pa.Table, pa.RecordBatch)):
@@ -48,12 +48,12 @@ def to_arrow(table: Any, origin: Origin | None = None) -> pa.Table:
     else:
         raise refused
     known = _wanted(arrow.column_names, lambda name: _is_time(arrow.schema.field(name).type))
-    # Without a known column all names go on, for the message that says what is missing.
+    # Without a known column all names are passed on, for the message about missing ones.
     return _in_seconds(arrow if known in ([], arrow.column_names) else arrow.select(known), origin or Origin())
 
 
 def _wanted(names: list[str], is_time: Callable[[str], bool]) -> list[str]:
-    """Columns of a recording; where none of them is the time, the one that holds dates and times or durations."""
+    """Return the columns of a recording; if none of them is the time, also the one with dates and times or durations."""
     known = [name for name in names if name in COLUMNS]
     if not any(name in TIMES for name in known):
         times = [name for name in names if name not in COLUMNS and is_time(name)]
@@ -65,7 +65,7 @@ def _wanted(names: list[str], is_time: Callable[[str], bool]) -> list[str]:
 
 
 def _is_time_kind(dtype: Any) -> bool:
-    """Whether a dtype of numpy or pandas is one of moments or durations."""
+    """True if a dtype of numpy or pandas is a timestamp or a duration."""
     return getattr(dtype, "kind", None) in ("M", "m")
 
 
@@ -84,7 +84,7 @@ def _in_seconds(arrow: pa.Table, origin: Origin) -> pa.Table:
 
 
 def seconds(column: Any, field: pa.Field, origin: Origin) -> np.ndarray:
-    """Seconds from the origin, each the double that is nearest."""
+    """Return seconds from the origin, each rounded to the nearest double."""
     column = column.combine_chunks() if isinstance(column, pa.ChunkedArray) else column
     if column.null_count:
         row = column.is_null().to_pylist().index(True)
@@ -106,12 +106,12 @@ def seconds(column: Any, field: pa.Field, origin: Origin) -> np.ndarray:
 
 
 def from_core(batch: Any) -> pa.Table:
-    """What the compiled part gives back."""
+    """Convert a result of the compiled part."""
     return pa.Table.from_batches([pa.record_batch(batch)])
 
 
 def converter(like: Any) -> Callable[[Any], Any]:
-    """What turns an Arrow table into one of the kind of ``like``."""
+    """Return a function that converts an Arrow table to the kind of ``like``."""
     if isinstance(like, Mapping):
         return lambda table: {
             name: column.to_numpy(zero_copy_only=False) for name, column in zip(table.column_names, table.columns)
@@ -129,7 +129,7 @@ def converter(like: Any) -> Callable[[Any], Any]:
 
 
 def _array(column: Any) -> Any:
-    """A column as Arrow takes it without a look at each cell."""
+    """Convert a column to Arrow without visiting each cell."""
     return column if isinstance(column, (pa.Array, pa.ChunkedArray)) else pa.array(column)
 
 

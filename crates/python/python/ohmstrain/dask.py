@@ -1,7 +1,7 @@
 """Recordings in a Dask dataframe: ``pip install 'ohmstrain[dask]'``.
 
-As :mod:`ohmstrain.spark`: each group of rows with the same keys is a recording, a bad one is a row with a text in the
-column ``error``, doubts stand in ``warnings``.
+As :mod:`ohmstrain.spark`: each group of rows with the same keys is a recording, a bad one gives a row with a text in the
+column ``error``, and doubts are in ``warnings``.
 
 >>> from ohmstrain import dask as oh_dask
 >>> oh_dask.smooth(dask.dataframe.read_parquet("recordings"), sensors).to_parquet("estimates")     # doctest: +SKIP
@@ -20,27 +20,27 @@ from ._tables import COLUMNS
 if TYPE_CHECKING:
     from dask.dataframe import DataFrame
 
-#: Columns that tell recordings apart, the sensor's first.
+#: Columns that distinguish recordings, that of the sensor first.
 BY = ("sensor_id", "recording_id")
 
 
 def filter(df: DataFrame, sensors: Any, by: Iterable[str] = BY, **options: Any) -> DataFrame:
-    """Estimates, each from the readings up to it. See :func:`ohmstrain.spark.filter`."""
+    """Filter each recording: estimates from the readings up to each row. See :func:`ohmstrain.spark.filter`."""
     return _grouped(df, Work("filter", by, sensors, **options))
 
 
 def smooth(df: DataFrame, sensors: Any, by: Iterable[str] = BY, **options: Any) -> DataFrame:
-    """Estimates, each from all readings of its recording. See :func:`ohmstrain.spark.smooth`."""
+    """Smooth each recording: estimates from all its readings. See :func:`ohmstrain.spark.smooth`."""
     return _grouped(df, Work("smooth", by, sensors, **options))
 
 
 def evaluate(df: DataFrame, sensors: Any, by: Iterable[str] = BY, **options: Any) -> DataFrame:
-    """Scores, a row per recording. See :func:`ohmstrain.spark.evaluate`."""
+    """Score each recording in one row. See :func:`ohmstrain.spark.evaluate`."""
     return _grouped(df, Work("evaluate", by, sensors, **options))
 
 
 def calibrate(df: DataFrame, by: Iterable[str] = ("sensor_id",), **choices: Any) -> DataFrame:
-    """A sensor per group. See :func:`ohmstrain.spark.calibrate`."""
+    """Calibrate a sensor per group. See :func:`ohmstrain.spark.calibrate`."""
     return _grouped(df, Work("calibrate", by, **choices))
 
 
@@ -57,5 +57,5 @@ def _grouped(df: DataFrame, work: Work) -> DataFrame:
         done = [work(pa.Table.from_pandas(group, preserve_index=False)) for _, group in groups]
         return pa.concat_tables(done).to_pandas().astype(types) if done else empty
 
-    # All rows of a recording into one partition; what follows needs no more of Dask.
+    # All rows of a recording go into one partition; nothing else is needed from Dask.
     return needed.shuffle(on=work.by).map_partitions(of_partition, meta=empty)

@@ -9,7 +9,7 @@ import pyarrow as pa
 
 from . import _tables
 
-#: Colours of the report: estimate, reference, what else there is.
+#: Colours of the report: estimate, reference, others.
 ESTIMATE, REFERENCE, OTHER = "#1f5fa8", "#222222", "#b3541e"
 
 
@@ -32,16 +32,16 @@ def _column(table: Any, name: str) -> np.ndarray:
 
 
 def strain(estimates: Any, recording: Any = None, *, gauge_length_mm: float | None = None, ax: Any = None) -> Any:
-    """Strain with its 95 % interval against time, and the reference, if the recording has one.
+    """Draw strain with its 95 % interval against time, and the reference, if the recording has one.
 
     Parameters
     ----------
     estimates
-        What :meth:`Sensor.filter` or :meth:`Sensor.smooth` returned.
+        Result of :meth:`Sensor.filter` or :meth:`Sensor.smooth`.
     recording
         The recording, for its reference.
     gauge_length_mm
-        Makes strain of a reference in ``displacement_mm``, which is not drawn without.
+        Length that converts a reference in ``displacement_mm`` to strain; without it such a reference is not drawn.
     ax
         Axes to draw in; new ones by default.
 
@@ -78,7 +78,7 @@ class SensorPlots:
         self._sensor = sensor
 
     def gauge(self, *, ax: Any = None) -> Any:
-        """The quasi-static curve g: relative change of the resistance at rest against strain.
+        """Draw the quasi-static curve g: relative change of the settled resistance against strain.
 
         Returns
         -------
@@ -94,8 +94,8 @@ class SensorPlots:
         return ax.figure
 
     def calibration(self) -> Any:
-        """What the calibration has seen and what it came to: the quasi-static curve, the strains that were seen, and the
-        error on quarters left out beside the static cubic's.
+        """Draw the calibration: the quasi-static curve, the distribution of the recorded strains, and the error on held-out
+        quarters beside the static cubic's.
 
         Returns
         -------
@@ -122,7 +122,7 @@ class SensorPlots:
 
 
 def _gauge(gauge: dict[str, Any], strain: np.ndarray) -> np.ndarray:
-    """g(strain); the formulas are those of NOTATION.md."""
+    """Return g(strain), by the formulas of NOTATION.md."""
     family = gauge["family"]
     if family == "polynomial":
         return sum(c * strain ** (k + 1) for k, c in enumerate(gauge["coefficients"]))

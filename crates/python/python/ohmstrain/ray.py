@@ -1,7 +1,7 @@
 """Recordings in a Ray dataset: ``pip install 'ohmstrain[ray]'``.
 
-As :mod:`ohmstrain.spark`: each group of rows with the same keys is a recording, a bad one is a row with a text in the
-column ``error``, doubts stand in ``warnings``.
+As :mod:`ohmstrain.spark`: each group of rows with the same keys is a recording, a bad one gives a row with a text in the
+column ``error``, and doubts are in ``warnings``.
 
 >>> from ohmstrain import ray as oh_ray
 >>> oh_ray.smooth(ray.data.read_parquet("recordings"), sensors).write_parquet("estimates")     # doctest: +SKIP
@@ -19,27 +19,27 @@ from ._groups import Work
 if TYPE_CHECKING:
     from ray.data import Dataset
 
-#: Columns that tell recordings apart, the sensor's first.
+#: Columns that distinguish recordings, that of the sensor first.
 BY = ("sensor_id", "recording_id")
 
 
 def filter(ds: Dataset, sensors: Any, by: Iterable[str] = BY, **options: Any) -> Dataset:
-    """Estimates, each from the readings up to it. See :func:`ohmstrain.spark.filter`."""
+    """Filter each recording: estimates from the readings up to each row. See :func:`ohmstrain.spark.filter`."""
     return _grouped(ds, Work("filter", by, sensors, **options))
 
 
 def smooth(ds: Dataset, sensors: Any, by: Iterable[str] = BY, **options: Any) -> Dataset:
-    """Estimates, each from all readings of its recording. See :func:`ohmstrain.spark.smooth`."""
+    """Smooth each recording: estimates from all its readings. See :func:`ohmstrain.spark.smooth`."""
     return _grouped(ds, Work("smooth", by, sensors, **options))
 
 
 def evaluate(ds: Dataset, sensors: Any, by: Iterable[str] = BY, **options: Any) -> Dataset:
-    """Scores, a row per recording. See :func:`ohmstrain.spark.evaluate`."""
+    """Score each recording in one row. See :func:`ohmstrain.spark.evaluate`."""
     return _grouped(ds, Work("evaluate", by, sensors, **options))
 
 
 def calibrate(ds: Dataset, by: Iterable[str] = ("sensor_id",), **choices: Any) -> Dataset:
-    """A sensor per group. See :func:`ohmstrain.spark.calibrate`."""
+    """Calibrate a sensor per group. See :func:`ohmstrain.spark.calibrate`."""
     return _grouped(ds, Work("calibrate", by, **choices))
 
 

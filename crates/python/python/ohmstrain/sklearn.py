@@ -14,21 +14,20 @@ from ._sensor import calibrate
 class StrainRegressor(RegressorMixin, BaseEstimator):
     """Strain from time and resistance, as a regressor of scikit-learn.
 
-    Rows of ``X`` are time, s, and reading, Ω; recordings stand one below the other, and where time does not go on another one
-    begins. Rows belong together and to their order: shuffled splits make no sense, ``GroupKFold`` by recording or
-    ``TimeSeriesSplit`` do.
+    Rows of ``X`` are time, s, and reading, Ω. Recordings follow one another; a new one begins where time does not increase. The
+    order of rows matters: use ``GroupKFold`` by recording or ``TimeSeriesSplit``, not shuffled splits.
 
     Parameters
     ----------
     estimator : str
         As in :func:`ohmstrain.calibrate`.
     smooth : bool
-        Predict each strain from all readings of its recording, in place of those up to it.
+        Predict each strain from all readings of its recording, instead of those up to it.
 
     Attributes
     ----------
     sensor_ : ohmstrain.Sensor
-        What was calibrated.
+        The calibrated sensor.
     """
 
     def __init__(self, estimator: str = "auto", smooth: bool = True) -> None:
@@ -36,7 +35,7 @@ class StrainRegressor(RegressorMixin, BaseEstimator):
         self.smooth = smooth
 
     def fit(self, X: Any, y: Any) -> StrainRegressor:
-        """Calibrate on recordings, ``y`` their strains; NaN stands for what is missing."""
+        """Calibrate on recordings with strains ``y``; missing values are NaN."""
         X, y = validate_data(self, X, y, y_numeric=True, dtype=float, ensure_all_finite="allow-nan", ensure_min_samples=2)
         self._check_columns(X)
         recordings = [
@@ -46,7 +45,7 @@ class StrainRegressor(RegressorMixin, BaseEstimator):
         return self
 
     def predict(self, X: Any, return_std: bool = False) -> Any:
-        """Strains, and their standard deviations if wanted."""
+        """Predict strains, and their standard deviations if requested."""
         check_is_fitted(self)
         X = validate_data(self, X, reset=False, dtype=float, ensure_all_finite="allow-nan")
         mean, sd = np.empty(len(X)), np.empty(len(X))
@@ -69,6 +68,6 @@ class StrainRegressor(RegressorMixin, BaseEstimator):
 
 
 def _recordings(time_s: np.ndarray) -> list[slice]:
-    """Rows of each recording."""
+    """Return the rows of each recording."""
     starts = [0, *(np.flatnonzero(np.diff(time_s) <= 0) + 1), len(time_s)]
     return [slice(first, end) for first, end in zip(starts, starts[1:])]

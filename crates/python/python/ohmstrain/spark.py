@@ -1,9 +1,8 @@
 """Recordings in a Spark DataFrame: ``pip install 'ohmstrain[spark]'``, Spark 4.0 or newer.
 
 Each group of rows with the same keys is a recording. Rows may come in any order; they are put in order of time inside the
-group. What comes of it is the same as on one machine, to the bit. A recording that cannot be done is a row with a text in
-the column ``error``, and the job goes on. What a notebook warns of stands in the column ``warnings``, in the recording's
-first row.
+group. The result is the same as on one machine, to the bit. A recording that fails gives a row with a text in the column
+``error``, and the job goes on. Warnings are in the column ``warnings``, in the recording's first row.
 
 >>> from ohmstrain import spark as oh_spark
 >>> done = oh_spark.smooth(df, sensors, by=["sensor_id", "recording_id"])     # doctest: +SKIP
@@ -24,12 +23,12 @@ from ._tables import COLUMNS
 if TYPE_CHECKING:
     from pyspark.sql import DataFrame
 
-#: Columns that tell recordings apart, the sensor's first.
+#: Columns that distinguish recordings, that of the sensor first.
 BY = ("sensor_id", "recording_id")
 
 
 def filter(df: DataFrame, sensors: Any, by: Iterable[str] = BY, *, streaming: bool = False, **options: Any) -> DataFrame:
-    """Estimates, each from the readings up to it.
+    """Filter each recording: estimates from the readings up to each row.
 
     Parameters
     ----------
@@ -38,40 +37,39 @@ def filter(df: DataFrame, sensors: Any, by: Iterable[str] = BY, *, streaming: bo
     sensors
         One :class:`ohmstrain.Sensor` (or its text) for all, or a dict of them by the first key.
     by
-        Columns that tell recordings apart.
+        Columns that distinguish recordings.
     streaming
-        Hold one Arrow batch of a recording at a time, whatever its length; needs Spark 4.1 and sorts by time on disk.
+        Keep one Arrow batch of a recording in memory at a time, whatever its length; needs Spark 4.1 and sorts by time on disk.
     **options
-        As of :meth:`ohmstrain.Sensor.filter`.
+        As in :meth:`ohmstrain.Sensor.filter`.
 
     Returns
     -------
     DataFrame
-        Keys, columns of ``estimates.csv``, ``warnings``: null but in the first row of a recording that is doubted (of the
-        batch in which that is found, if ``streaming``), and ``error``: null but in the one row of a recording that cannot
-        be done.
+        Keys and columns of ``estimates.csv``; ``warnings``, null except in the first row of a doubtful recording (of the batch
+        in which the doubt arises, if ``streaming``); and ``error``, null except in the single row of a recording that fails.
     """
     work = Work("filter", by, sensors, **options)
     return _streamed(df, work) if streaming else _grouped(df, work)
 
 
 def smooth(df: DataFrame, sensors: Any, by: Iterable[str] = BY, **options: Any) -> DataFrame:
-    """Estimates, each from all readings of its recording. Parameters and result are those of :func:`filter`."""
+    """Smooth each recording: estimates from all its readings. Parameters and result are those of :func:`filter`."""
     return _grouped(df, Work("smooth", by, sensors, **options))
 
 
 def evaluate(df: DataFrame, sensors: Any, by: Iterable[str] = BY, **options: Any) -> DataFrame:
-    """Scores, a row per recording: errors in percent of full scale, coverage of the 95 % interval as a share."""
+    """Score each recording in one row: errors in percent of full scale, coverage of the 95 % interval as a share."""
     return _grouped(df, Work("evaluate", by, sensors, **options))
 
 
 def calibrate(df: DataFrame, by: Iterable[str] = ("sensor_id",), **choices: Any) -> DataFrame:
-    """A sensor per group, as the text of its ``sensor.toml`` with scores on quarters left out."""
+    """Calibrate a sensor per group; return the text of its ``sensor.toml``, with scores on held-out quarters."""
     return _grouped(df, Work("calibrate", by, **choices))
 
 
 def _prepared(df: DataFrame, work: Work) -> tuple[DataFrame, Any]:
-    """The columns that travel, and the schema of the result; refuses what cannot be done before the job starts."""
+    """Return the columns that are passed on, and the schema of the result; refuse invalid tables before the job starts."""
     known = {*work.by, *COLUMNS}
     kinds = {name: to_arrow_type(df.schema[name].dataType) if name in known else None for name in df.columns}
     work.check(kinds)

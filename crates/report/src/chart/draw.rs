@@ -13,13 +13,13 @@ use crate::axis::Axis;
 use crate::ink::Ink;
 use crate::thin::Point;
 
-/// The plotting library's sizes of text are this much larger than the font sizes it writes.
+/// Ratio of the plotting library's text sizes to the font sizes that it writes.
 const FONT_SIZE_FACTOR: f64 = 1.24;
 /// Radius of a dot, px.
 const DOT_PX: f64 = 1.6;
 
 impl Chart {
-    /// The drawing, with `description` for those who do not see it.
+    /// Draws the plot as SVG, with `description` as its text alternative.
     ///
     /// # Errors
     /// If the plotting library cannot draw it.
@@ -27,7 +27,7 @@ impl Chart {
         let mut drawing = String::new();
         let size = (fine(self.size_px.0).unsigned_abs(), fine(self.size_px.1).unsigned_abs());
         self.draw(SVGBackend::with_string(&mut drawing, size)).map_err(ReportError::Plot)?;
-        // Its size on the page is the style sheet's affair; the view box keeps the proportions.
+        // The style sheet sets its size on the page; the view box keeps the proportions.
         let inside = drawing.split_once("viewBox").map_or("", |(_, inside)| inside);
         let inside = self.with_data_apart(inside);
         let label = minijinja::HtmlEscape(description);
@@ -45,11 +45,11 @@ impl Chart {
         [LEFT_PX, ABOVE_PX, width, height].map(|px| fine(px).to_string()).join(" ")
     }
 
-    /// The layers in a group of their own, which a script can move without the axes.
+    /// Puts the layers into a group of their own, which a script can move without the axes.
     fn with_data_apart(&self, inside: &str) -> String {
         let Some(layers) = self.layers.first() else { return inside.into() };
         let hex = layers.ink.hex();
-        // Each ink has a colour of its own, and axes come first.
+        // Each ink has a unique colour, and axes come first.
         let first = inside.find(&format!("\"{hex}\"")).and_then(|at| inside[..at].rfind('<'));
         match (first, inside.rfind("</svg>")) {
             (Some(first), Some(end)) if first < end => {

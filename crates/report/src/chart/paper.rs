@@ -1,24 +1,24 @@
-//! A plot by itself, for a paper.
+//! A stand-alone plot for a paper.
 
 use super::{Chart, HALF, LEFT_PX, RIGHT_PX, TEXT_PX, UNITS_PER_PX, WIDE};
 use crate::ReportError;
 use crate::ink::dashes;
 
-/// Width of a figure across a page and across a column, mm.
+/// Widths of a figure across a page and across a column, mm.
 const PAGE_MM: f64 = 170.0;
 const COLUMN_MM: f64 = 85.0;
-/// Space to the left of a drawing by itself across a page, px: letters of the axis' label begin where it begins.
+/// Space to the left of a stand-alone drawing across a page, px: letters of the axis label begin at the left edge.
 const MARGIN_PX: f64 = 6.0;
-/// One scale for all, so that letters are of one size: 13 px are 2.3 mm.
+/// Common scale, so that letters have the same size everywhere: 13 px are 2.3 mm.
 const PX_PER_MM: f64 = (WIDE.0 + MARGIN_PX) / PAGE_MM;
 
 impl Chart {
-    /// Width of the drawing by itself, mm: a column's or a page's.
+    /// Returns the width of the stand-alone drawing, mm: a column's or a page's.
     pub const fn width_mm(&self) -> f64 {
         if self.size_px.0 <= HALF.0 { COLUMN_MM } else { PAGE_MM }
     }
 
-    /// The drawing by itself, with its legend, in the colours of paper.
+    /// Draws the plot on its own, with its legend, in the colours for paper.
     ///
     /// # Errors
     /// If the plotting library cannot draw it.
@@ -43,14 +43,14 @@ impl Chart {
         ))
     }
 
-    /// The legend in drawing units, and its height.
+    /// Returns the legend in drawing units, and its height.
     fn drawn_legend(&self) -> (String, f64) {
         let units = f64::from(UNITS_PER_PX);
         let (sample, gap, row, size) = (26.0 * units, 8.0 * units, 19.0 * units, TEXT_PX * units);
         let (mut x, mut y) = (LEFT_PX * units, row);
         let mut drawn = String::new();
         for key in &self.legend {
-            // Letters are half as wide as high, on average.
+            // Letters are on average half as wide as high.
             let width = sample + 2.0 * gap + 0.52 * size * key.name.chars().count() as f64;
             if x > LEFT_PX * units && x + width > (self.size_px.0 - RIGHT_PX) * units {
                 (x, y) = (LEFT_PX * units, y + row);

@@ -1,4 +1,4 @@
-//! EKF of strain, rate and one branch, the step prepared anew for every reading.
+//! EKF of strain, rate and one branch, with the step prepared anew for every reading.
 #![no_std]
 #![no_main]
 

@@ -1,4 +1,4 @@
-//! EKF without the zeros, three states, at a fixed rate.
+//! Sparse EKF of three states at a fixed rate.
 #![no_std]
 #![no_main]
 

@@ -1,4 +1,4 @@
-//! Sparse EKF of strain, rate and one branch, which may be given another step length at every reading.
+//! Sparse EKF of strain, rate and one branch, which accepts another step length at every reading.
 #![no_std]
 #![no_main]
 

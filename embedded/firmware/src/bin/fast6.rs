@@ -1,4 +1,4 @@
-//! EKF without the zeros, six states, at a fixed rate.
+//! Sparse EKF of six states at a fixed rate.
 #![no_std]
 #![no_main]
 

@@ -1,4 +1,4 @@
-//! IMM without the zeros, six states each, at a fixed rate.
+//! Sparse IMM filter with six states per model, at a fixed rate.
 #![no_std]
 #![no_main]
 

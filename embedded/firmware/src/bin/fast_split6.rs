@@ -1,4 +1,4 @@
-//! Sign-split filter without the zeros, four hypotheses of six states, at a fixed rate.
+//! Sparse sign-split filter of four hypotheses with six states, at a fixed rate.
 #![no_std]
 #![no_main]
 

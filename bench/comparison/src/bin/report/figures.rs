@@ -1,4 +1,4 @@
-//! Figures that were measured with one build.
+//! Measurements of one build.
 
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-/// Figures of one build by name.
+/// Measurements of one build, by name.
 pub struct Build {
     /// The processor it was built for.
     pub level: String,
@@ -22,7 +22,7 @@ impl Build {
         let level = directory.file_name().ok_or("a target directory has a name")?.to_string_lossy().into_owned();
         let mut nanoseconds = BTreeMap::new();
         for group in ["step", "recording", "pass"] {
-            // A group that was not run leaves "not measured" in the table.
+            // A group that was not run appears as "not measured" in the table.
             let Ok(functions) = std::fs::read_dir(directory.join("criterion").join(group)) else { continue };
             for function in functions {
                 let (path, name) = function.map(|entry| (entry.path().join("new"), entry.file_name()))?;
@@ -39,18 +39,18 @@ impl Build {
         Ok(Self { level, nanoseconds, bytes })
     }
 
-    /// Median time, ns.
+    /// Returns the median time, ns.
     pub fn ns(&self, name: &str) -> Option<f64> {
         self.nanoseconds.get(name).copied()
     }
 
-    /// Peak heap per sample, bytes.
+    /// Returns the peak heap per sample, bytes.
     pub fn bytes(&self, name: &str) -> Option<f64> {
         self.bytes.get(name).copied()
     }
 }
 
-/// Median per element of a benchmark, ns.
+/// Returns the median time per element of a benchmark, ns.
 fn median_ns(directory: &Path) -> Result<f64, Box<dyn Error>> {
     let json = |file: &str| -> Result<Value, Box<dyn Error>> {
         Ok(serde_json::from_str(&std::fs::read_to_string(directory.join(file))?)?)

@@ -1,9 +1,9 @@
-//! Machine and tools with which the figures were measured.
+//! Machine and tools of the measurements.
 
 use std::error::Error;
 use std::process::Command;
 
-/// One sentence: processor, cores, compiler, and how long was measured.
+/// Describes, in one sentence, processor, cores, compiler, and duration of the measurements.
 pub fn describe(mode: &str) -> Result<String, Box<dyn Error>> {
     let cpu = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let field = |name: &str| {

@@ -1,4 +1,4 @@
-//! Writes `../README.md` from what criterion, the memory program and callgrind have measured. `../run.sh` runs it.
+//! Writes `../README.md` from the measurements by criterion, the memory program and callgrind. `../run.sh` runs it.
 //!
 //! ```text
 //! report README MODE TARGET_DIR…     one directory per build, named after the processor it was built for

@@ -1,4 +1,4 @@
-//! The tables, and the targets beside the figures.
+//! Tables of the measurements, with their targets.
 
 use std::fmt::Write;
 
@@ -12,7 +12,7 @@ enum Target {
 
 use Target::{AtLeast, AtMost};
 
-/// A ratio of two times, and what it should be.
+/// A ratio of two times, and its target.
 struct Ratio {
     words: &'static str,
     over: &'static str,
@@ -43,7 +43,7 @@ const BESIDE: [Ratio; 5] = [
     ratio("generic EKF ÷ sparse EKF", "step/ekf_3", "step/sparse_ekf_3", AtLeast(1.0)),
 ];
 
-/// The targets.
+/// Returns the table of the ratios with targets.
 pub fn targets(builds: &[Build]) -> String {
     ratios(&TARGETS, builds)
 }
@@ -58,12 +58,12 @@ pub fn instructions(budget: &str) -> Option<String> {
     ))
 }
 
-/// Returns the ratios of the same filters to others that are given constant matrices.
+/// Returns the ratios of the same filters to others with constant matrices.
 pub fn beside_constants(builds: &[Build]) -> String {
     ratios(&BESIDE, builds)
 }
 
-/// Ratios first: they travel further than nanoseconds.
+/// Formats ratios; they come first, since they depend less on the machine than nanoseconds.
 fn ratios(ratios: &[Ratio], builds: &[Build]) -> String {
     let mut out = header("ratio | target", builds);
     for Ratio { words, over, under, target } in ratios {
@@ -111,7 +111,7 @@ const STEPS: [(&str, &str); 23] = [
     ("kfilter UKF, linear", "kfilter_ukf_3"),
 ];
 
-/// Nanoseconds of one step; what is not measured is left out.
+/// Returns the table of nanoseconds per step; what was not measured is left out.
 pub fn steps(builds: &[Build]) -> String {
     let mut out = header("one step (three states unless said), ns", builds);
     for (words, name) in STEPS {
@@ -129,7 +129,7 @@ const SMOOTHERS: [(&str, &str); 3] = [
     ("typed-kalman 0.1's", "typed_kalman_smoother_3"),
 ];
 
-/// Rows and passes a second.
+/// Returns the table of rows and passes per second.
 pub fn recordings(builds: &[Build]) -> String {
     let mut out = header("filter and smoother over 10 000 rows, million rows a second", builds);
     let per_second = |build: &Build, name: &str, scale: f64| build.ns(name).map(|ns| 1e9 / ns / scale);
@@ -147,7 +147,7 @@ pub fn recordings(builds: &[Build]) -> String {
     out
 }
 
-/// Bytes; the same in all builds, so the first one's.
+/// Returns the table of bytes; all builds have the same, so the first one's are shown.
 pub fn memory(builds: &[Build]) -> String {
     let mut out = "| smoother, three states | peak heap, B a row (target) |\n|---|--:|\n".to_owned();
     for (words, name) in SMOOTHERS {
@@ -167,7 +167,7 @@ fn header(first: &str, builds: &[Build]) -> String {
 }
 
 fn row(out: &mut String, first: &str, cells: impl Iterator<Item = String>) {
-    // Writing into a string does not fail.
+    // Writing into a string cannot fail.
     let _ = writeln!(out, "| {first} | {} |", cells.collect::<Vec<_>>().join(" | "));
 }
 

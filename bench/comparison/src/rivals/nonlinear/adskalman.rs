@@ -56,7 +56,7 @@ impl ObservationModel<f64, Const<3>, Const<1>> for Step {
     }
 }
 
-/// adskalman, covariance in Joseph's form as it does by default.
+/// adskalman, with the covariance in Joseph's form, its default.
 pub struct Adskalman {
     model: NonlinearModel,
     state: State,

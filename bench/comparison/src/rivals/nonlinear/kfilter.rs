@@ -5,11 +5,11 @@ use nalgebra_0_34::{SMatrix, SVector};
 use ohmstrain_bench_filters::{Filter, NonlinearModel};
 use ohmstrain_ekf::Belief;
 
-/// The sensor as kfilter's system: it asks for F and Q after the step.
+/// The sensor as kfilter's system, which provides F and Q after the step.
 struct Sensor {
     model: NonlinearModel,
     state: SVector<f64, 3>,
-    /// Covariances of strain and rate before the step, which this system has to be told.
+    /// Covariances of strain and rate before the step; kfilter does not pass them to a system.
     motion: [f64; 3],
     transition: SMatrix<f64, 3, 3>,
     transition_transposed: SMatrix<f64, 3, 3>,
@@ -94,7 +94,7 @@ impl LinearisableMeasurement<f64, 3, 1> for Expected {
     }
 }
 
-/// kfilter; its covariance is (I - K H) P, made symmetric.
+/// kfilter, with the covariance (I - K H) P, made symmetric.
 pub struct Kfilter(Kalman<f64, 3, 0, Sensor>);
 
 impl Kfilter {

@@ -1,5 +1,4 @@
-//! The others with F, Q and H worked out in every step, which is for their user to do. They have neither gate nor
-//! log-likelihood.
+//! The other filters, with F, Q and H computed in every step by their user. They have neither a gate nor a log-likelihood.
 
 mod adskalman;
 mod kfilter;
@@ -9,7 +8,7 @@ mod typed_kalman;
 use ohmstrain_bench_filters::{STEPS, Visitor, readings, sensor};
 use ohmstrain_ekf::Belief;
 
-/// Shows each of them, with the readings that ours of three states get.
+/// Passes each of them to the visitor, with the same readings as our filters of three states.
 pub fn every_nonlinear_rival(visitor: &mut impl Visitor) {
     let (readings, start) = (readings::<1>(STEPS), Belief::initial(&sensor::<1, 3>()));
     visitor.visit("nonlinear_nalgebra_3", &readings, nalgebra_straight::Straight::new(&start));

@@ -2,7 +2,7 @@ use nalgebra::{SMatrix, SVector};
 use ohmstrain_bench_filters::{Filter, NonlinearModel};
 use ohmstrain_ekf::Belief;
 
-/// The textbook with nalgebra's matrices: full matrices, a scalar reading, no check.
+/// Textbook filter with nalgebra's matrices: full matrices, a scalar reading, no checks.
 pub struct Straight {
     model: NonlinearModel,
     mean: SVector<f64, 3>,

@@ -35,7 +35,7 @@ impl MeasurementJacobian<3, 1> for Measurement {
     }
 }
 
-/// typed-kalman's EKF: checks and the normalised innovation squared.
+/// typed-kalman's EKF, with its checks and the normalised innovation squared.
 pub struct TypedKalman {
     model: NonlinearModel,
     filter: Ekf<3>,

@@ -5,11 +5,11 @@ use std::error::Error;
 use std::fmt::Write;
 use std::path::Path;
 
-/// Growth that is let pass with the compiler that the budget was measured with.
+/// Tolerated growth with the compiler that the budget was measured with.
 const ROOM: f64 = 1.05;
-/// Growth that is let pass with any other.
+/// Tolerated growth with any other compiler.
 const ROOM_OTHER_COMPILER: f64 = 1.25;
-/// Separates the rule, which people write, from the figures, which `--update` writes.
+/// Line between the rules, which people write, and the figures, which `--update` writes.
 const FIGURES: &str = "# Measured; written by `instructions.sh --update`.\n";
 
 /// Instructions per step by name.
@@ -30,7 +30,7 @@ impl Counts {
     }
 }
 
-/// The committed figures and the compiler they were measured with.
+/// The committed figures, and the compiler that they were measured with.
 pub struct Budget {
     rustc: String,
     per_step: BTreeMap<String, f64>,
@@ -40,7 +40,7 @@ pub struct Budget {
 pub struct Verdict {
     /// Table of every figure beside its budget.
     pub table: String,
-    /// Figures that break the rule, in words.
+    /// Figures that exceed their limit, in words.
     pub broken: Vec<String>,
 }
 
@@ -66,7 +66,7 @@ impl Budget {
         Ok(std::fs::write(path, text)?)
     }
 
-    /// Compares.
+    /// Compares counts with the budget.
     pub fn judge(&self, counts: &Counts, rustc: &str) -> Verdict {
         let same = self.rustc == rustc;
         let room = if same { ROOM } else { ROOM_OTHER_COMPILER };
@@ -82,7 +82,7 @@ impl Budget {
             let change = 100.0 * (count / budget - 1.0);
             let hint = if same && *count < budget / ROOM { "  cheaper: lower the budget with --update" } else { "" };
             verdict.table += &format!("{name:<24} {count:>8.0} of {budget:>6} {change:>+6.1} %{hint}\n");
-            // Written so that a NaN breaks its limit.
+            // Written so that NaN exceeds its limit.
             let within = *count <= budget * room;
             if !within {
                 let allowed = 100.0 * (room - 1.0);

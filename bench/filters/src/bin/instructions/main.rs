@@ -1,4 +1,4 @@
-//! Instructions per step, counted by callgrind, and the limits they have to keep. `../instructions.sh` runs it.
+//! Instructions per step, counted by callgrind, and their limits. `../instructions.sh` runs it.
 //!
 //! ```text
 //! instructions list                                 what can be counted
@@ -52,13 +52,13 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Callgrind counts while this function is on the stack.
+/// Runs the work; callgrind counts while this function is on the stack.
 #[inline(never)]
 fn counted<T>(work: impl FnOnce() -> T) -> T {
     work()
 }
 
-/// Names everything that can be counted, with the work that does it.
+/// Passes every name that can be counted to `see`, with its work.
 fn each(see: &mut dyn FnMut(&'static str, &mut dyn FnMut())) {
     every_filter(&mut Stepper(see));
     let recording = readings::<1>(STEPS);

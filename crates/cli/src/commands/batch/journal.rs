@@ -23,15 +23,15 @@ pub struct Entry {
     pub sensor_sha256: Option<String>,
     /// SHA-256 of the file that `--prior` among the flags names.
     pub prior_sha256: Option<String>,
-    /// Flags but for `--sensor` and what `batch` adds.
+    /// Flags other than `--sensor` and those that `batch` adds.
     pub flags: Vec<String>,
-    /// Program and version.
+    /// Name and version of the program.
     pub made_by: String,
-    /// Below the folder of outputs.
+    /// Path below the folder of outputs.
     pub output: PathBuf,
     pub output_sha256: Option<String>,
     pub state: State,
-    /// Exit code of the command; `None` if it had no chance to give one.
+    /// Exit code of the command; `None` if the command did not run.
     pub exit_code: Option<i32>,
     /// Reason for its failure.
     pub message: String,
@@ -46,11 +46,11 @@ pub struct Entry {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum State {
-    /// Its output is there.
+    /// The output was written.
     Done,
-    /// The output was there before.
+    /// The output had been written by an earlier run.
     Kept,
-    /// No output, or one that `evaluate --check` found wanting.
+    /// No output, or one that failed `evaluate --check`.
     #[default]
     Failed,
 }
@@ -78,7 +78,7 @@ impl Entry {
     }
 }
 
-/// Journal of the jobs of earlier runs and of this one: a line of JSON each, of which the last one of an output counts.
+/// Journal of the jobs of earlier runs and of this one: one line of JSON per job. The last line of an output counts.
 pub struct Journal {
     folder: PathBuf,
     known: HashMap<PathBuf, Entry>,
@@ -89,8 +89,8 @@ pub struct Journal {
 pub const JOURNAL: &str = "batch.jsonl";
 
 impl Journal {
-    /// Reads the journal of a folder, and begins one if there is none. A file of this name from another program is replaced
-    /// with `force` only.
+    /// Reads the journal of a folder, or begins one. A file of this name that another program wrote is replaced only with
+    /// `force`.
     pub fn open(folder: &Path, force: bool) -> Result<Self, CliError> {
         let path = folder.join(JOURNAL);
         let bytes = if path.exists() { whole_file::bytes(&path)? } else { Vec::new() };
@@ -105,7 +105,7 @@ impl Journal {
             fs::write(&path, "").map_err(|error| CliError::file("write", &path, &error))?;
             text.clear();
         }
-        // A line that a killed run left unfinished, or another version wrote, says nothing.
+        // A line that a killed run left unfinished, or that another version wrote, is ignored.
         let entries = text.lines().filter_map(|line| serde_json::from_str::<Entry>(line).ok());
         let known = entries.map(|entry| (entry.output.clone(), entry)).collect();
         let opened = OpenOptions::new().create(true).append(true).open(&path);
@@ -129,7 +129,7 @@ impl Journal {
         is_done.then(|| known.clone())
     }
 
-    /// Notes what became of a job, at once.
+    /// Appends the result of a job, at once.
     pub fn note(&self, entry: &Entry) -> Result<(), CliError> {
         let mut line = serde_json::to_vec(entry).map_err(|error| CliError::Other(error.to_string()))?;
         line.push(b'\n');

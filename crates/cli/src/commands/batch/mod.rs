@@ -1,7 +1,7 @@
 //! One command over many recordings.
 //!
-//! Every recording is done by the function that does the command itself, with the flags that a person would type: what comes of
-//! it is the command's, to the byte, and an error or a bug of one recording stays its own.
+//! Each recording is processed by the function of the command itself, with the flags that a person would type. The result is
+//! the command's, to the byte, and an error or a bug in one recording does not affect the others.
 
 mod journal;
 mod plan;
@@ -25,7 +25,7 @@ use crate::messages::Messages;
 use crate::output::{Kind, Outputs};
 use crate::progress::Progress;
 
-/// Runs the command on all recordings that are not done yet, and sums up.
+/// Runs the command on all recordings that are not done yet, and writes their summary.
 pub fn run(args: &BatchArgs, messages: &Messages) -> Result<(), CliError> {
     let jobs = plan::jobs(args)?;
     plan::check_sensor(&jobs, args)?;
@@ -48,7 +48,7 @@ pub fn run(args: &BatchArgs, messages: &Messages) -> Result<(), CliError> {
     closing(&entries, &path(args.summary), &stale, messages)
 }
 
-/// Bytes of a thread's stack, as many as those of the thread that does a single command.
+/// Stack of a thread, bytes; the same as that of the thread that runs a single command.
 const STACK: usize = 8 << 20;
 
 struct Work<'a> {
@@ -77,18 +77,18 @@ impl Work<'_> {
             Ok::<_, CliError>(entries)
         };
         let places = self.args.jobs.or(thread::available_parallelism().ok()).map_or(1, usize::from);
-        // By itself a recording has all cores, which is what no threads stand for.
+        // A recording that runs alone uses all cores: zero threads means that to the pool.
         let threads = if places > 1 { places } else { 0 };
         let pool = ThreadPoolBuilder::new().num_threads(threads).stack_size(STACK).build();
         let pool = pool.map_err(|error| CliError::Other(format!("cannot start threads: {error}")))?;
-        // Recordings are no tasks of the pool's: a thread that waits for a part of one would begin another.
+        // Recordings are not tasks of the pool: a thread that waits for a part of one recording would begin another.
         let workers = pool.broadcast(|thread| if thread.index() < places { worker() } else { Ok(Vec::new()) });
         let mut entries = workers.into_iter().collect::<Result<Vec<_>, _>>()?.concat();
         entries.sort_by_key(|(job, _)| *job);
         Ok(entries.into_iter().map(|(_, entry)| entry).collect())
     }
 
-    /// Runs a job, unless that was done before.
+    /// Runs a job, unless an earlier run has done it.
     fn one(&self, job: &Job) -> Result<Entry, CliError> {
         let mut entry = self.workshop.entry(job);
         if let Err(message) = self.workshop.hash_inputs(job, &mut entry) {
@@ -109,7 +109,7 @@ impl Work<'_> {
     }
 }
 
-/// Prints the number of jobs of each kind, and names the summaries that are not of this run.
+/// Prints the number of jobs in each state, and names summaries that are not from this run.
 fn closing(entries: &[Entry], summary: &Path, stale: &[PathBuf], messages: &Messages) -> Result<(), CliError> {
     let count = |state| entries.iter().filter(|entry| entry.state == state).count();
     let (done, kept, failed) = (count(State::Done), count(State::Kept), count(State::Failed));

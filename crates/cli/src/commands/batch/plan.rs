@@ -14,30 +14,30 @@ use crate::renamed;
 use crate::sensor_file;
 use crate::whole_file;
 
-/// Recordings that are done together, and what comes of them.
+/// Recordings that are processed together, and their output.
 #[derive(Clone, Debug, Default)]
 pub struct Job {
-    /// One, or those that a sensor is calibrated on.
+    /// One file, or all files that one sensor is calibrated on.
     pub files: Vec<PathBuf>,
-    /// The sensor's parameters, if the command is given some.
+    /// File of the sensor's parameters, if the command takes one.
     pub sensor: Option<PathBuf>,
     /// File that `--prior` among the flags names.
     pub prior: Option<PathBuf>,
     /// Estimator that `--estimator` among the flags names.
     estimator: Option<EstimatorKind>,
-    /// Flags besides.
+    /// Further flags.
     pub flags: Vec<String>,
-    /// The output below the folder of outputs.
+    /// Path of the output below the folder of outputs.
     pub output: PathBuf,
 }
 
 impl Job {
-    /// Bytes of its recordings, as far as they can be read.
+    /// Returns the size of its recordings in bytes; a file that cannot be read counts as empty.
     pub fn bytes(&self) -> u64 {
         self.files.iter().filter_map(|file| fs::metadata(file).ok()).map(|found| found.len()).sum()
     }
 
-    /// Files that it reads.
+    /// Returns the files that it reads.
     pub fn inputs(&self) -> impl Iterator<Item = &PathBuf> {
         self.files.iter().chain(&self.sensor).chain(&self.prior)
     }
@@ -47,7 +47,7 @@ impl Job {
         self.files.iter().map(|file| file.display().to_string()).collect::<Vec<_>>().join(", ")
     }
 
-    /// Parses the command that does it, as a person would type it; its output is not given yet.
+    /// Parses the command line of this job as a person would type it, without the output.
     pub fn parsed(&self, args: &BatchArgs) -> Result<Args, clap::Error> {
         let mut words = vec!["ohmstrain".to_owned(), args.command.name().to_owned()];
         if args.command == BatchCommand::Calibrate {
@@ -69,7 +69,7 @@ impl Job {
     }
 }
 
-/// All jobs, each with a command line that the command takes.
+/// Returns all jobs, each with a valid command line.
 pub fn jobs(args: &BatchArgs) -> Result<Vec<Job>, CliError> {
     let sensor = args.sensor.clone().filter(|_| args.command != BatchCommand::Calibrate);
     let plain =
@@ -103,7 +103,7 @@ fn matching(pattern: &str) -> Result<Vec<PathBuf>, CliError> {
     Ok(files)
 }
 
-/// The rows of a manifest. Of `calibrate`, those with the same sensor are one job.
+/// Reads the rows of a manifest. For `calibrate`, rows with the same sensor are one job.
 fn listed(manifest: &Path, args: &BatchArgs, plain: &dyn Fn(PathBuf) -> Job) -> Result<Vec<Job>, CliError> {
     let wrong = |error: csv::Error| CliError::Input(format!("{}: {error}", manifest.display()));
     let text = whole_file::text(manifest)?;
@@ -177,7 +177,7 @@ impl ManifestRow<'_> {
     }
 }
 
-/// Names the outputs without a name after the recordings' paths below the folder that all of them share.
+/// Names the outputs that have no name after the recordings' paths below their common folder.
 fn name_outputs(jobs: &mut [Job], args: &BatchArgs) {
     let ending = match args.command {
         BatchCommand::Filter | BatchCommand::Smooth => args.format.name(),
@@ -193,11 +193,11 @@ fn name_outputs(jobs: &mut [Job], args: &BatchArgs) {
             && let Some(file) = job.files.first()
         {
             let below = shared.as_ref().and_then(|shared| file.strip_prefix(shared).ok()).unwrap_or(file);
-            // What leads out of the folder of outputs is left out.
+            // Components that lead out of the folder of outputs are dropped.
             job.output = below.components().filter(|part| matches!(part, Component::Normal(_))).collect();
             job.output.set_extension("");
         }
-        // Not `set_extension`: a name may have dots.
+        // Not `set_extension`: a name may contain dots.
         let mut name = job.output.clone().into_os_string();
         if job.output.extension().is_none_or(|found| found != ending) {
             name.push(".");
@@ -241,7 +241,7 @@ fn check_arguments(job: &mut Job, args: &BatchArgs) -> Result<(), CliError> {
         }
         _ => (None, vec![]),
     };
-    // What a manifest names lies in the folder of outputs; behind `--` one name would be written by each recording.
+    // Files that a manifest names lie in the folder of outputs; a name given after `--` would be written by each recording.
     let named = |path: &PathBuf| path.starts_with(&args.output) && !args.flags.iter().any(|flag| is_output(flag));
     if output.is_some() || !beside.iter().flatten().all(named) {
         let what = "batch names the outputs itself, or as the manifest's columns `output`, `report` and `figures` say";
@@ -254,14 +254,14 @@ fn is_output(flag: &str) -> bool {
     ["--report", "--figures"].contains(&flag.split('=').next().unwrap_or_default())
 }
 
-/// Refuses a shared sensor file that is none, or none for the jobs' estimator, before anything is done, and once.
+/// Refuses, once and before any work, a shared sensor file that is invalid or lacks the jobs' estimator.
 pub fn check_sensor(jobs: &[Job], args: &BatchArgs) -> Result<(), CliError> {
     let shared = jobs.iter().filter_map(|job| job.sensor.as_ref().map(|sensor| (sensor, job.estimator)));
     let shared: HashSet<_> = shared.filter(|(sensor, _)| args.sensor.as_ref() == Some(*sensor)).collect();
     shared.into_iter().try_for_each(|(sensor, estimator)| sensor_file::read(sensor, estimator).map(|_| ()))
 }
 
-/// Refuses outputs that would replace each other, an input, or what no earlier run wrote.
+/// Refuses outputs that would replace each other, an input, or a file that no earlier run wrote.
 pub fn check_outputs(jobs: &[Job], args: &BatchArgs, journal: &Journal) -> Result<(), CliError> {
     let inputs = jobs.iter().flat_map(Job::inputs);
     let inputs: HashSet<PathBuf> = inputs.filter_map(|file| fs::canonicalize(file).ok()).collect();

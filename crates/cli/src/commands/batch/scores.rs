@@ -3,8 +3,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::commands::evaluate::RecordingScores;
 
-/// Scores of `evaluate` for the first estimator, or of `calibrate` on its held-out parts: errors in %FS, coverage as
-/// a share.
+/// Scores of `evaluate` for the first estimator, or of `calibrate` on its held-out parts: errors in %FS, coverage as a share.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Figures {
     /// Rows that were scored.
@@ -17,7 +16,7 @@ pub struct Figures {
     pub static_cubic_percent_fs: Option<f64>,
     /// Coverage of the filter's 95 % interval.
     pub coverage_95: Option<f64>,
-    /// Its mean width.
+    /// Mean width of that interval, %FS.
     pub width_95_percent_fs: Option<f64>,
 }
 

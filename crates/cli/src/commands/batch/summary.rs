@@ -8,7 +8,7 @@ use crate::args::SummaryForm;
 use crate::error::CliError;
 use crate::parquet_table::ParquetTable;
 
-/// Several things in one cell stand apart by this.
+/// Separator of several values in one cell.
 const BETWEEN: &str = "; ";
 
 /// A cell of the summary.
@@ -17,7 +17,7 @@ enum Cell {
     Text(Option<String>),
 }
 
-/// Columns, in order.
+/// Returns the columns of an entry, in order.
 fn cells(entry: &Entry) -> Vec<(&'static str, Cell)> {
     let paths =
         |paths: &[PathBuf]| paths.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(BETWEEN);
@@ -48,15 +48,15 @@ fn cells(entry: &Entry) -> Vec<(&'static str, Cell)> {
     ]
 }
 
-/// Beginning of its name.
+/// Beginning of the summary's file name.
 pub const SUMMARY: &str = "summary";
 
-/// Names of its columns.
+/// Returns the names of its columns.
 pub fn columns() -> Vec<String> {
     cells(&Entry::default()).into_iter().map(|(name, _)| name.to_owned()).collect()
 }
 
-/// A row per job.
+/// Returns the summary as text, one row per job.
 pub fn text(entries: &[Entry], form: SummaryForm) -> Result<Vec<u8>, CliError> {
     let rows: Vec<_> = entries.iter().map(cells).collect();
     let mut text = Vec::new();
@@ -84,7 +84,7 @@ fn csv_of(out: &mut Vec<u8>, rows: &Rows) -> io::Result<()> {
 
 fn json_of(out: &mut Vec<u8>, rows: &Rows) -> io::Result<()> {
     let value = |cell: &Cell| match cell {
-        // Counts are whole.
+        // Counts are integers.
         Cell::Number(Some(number)) if number.fract() == 0.0 => json!(*number as i64),
         Cell::Number(number) => json!(number),
         Cell::Text(text) => json!(text),

@@ -20,15 +20,15 @@ use crate::output::{Destination, UnfinishedFolder};
 use crate::printable::printable;
 use ohmstrain::MADE_BY;
 
-/// Exit code of a program that has met a bug.
+/// Exit code of a job that panicked.
 const PANICKED: u8 = 101;
 
 /// Folder and settings in which jobs are done.
 pub struct Workshop<'a> {
     args: &'a BatchArgs,
-    /// Folder for outputs until they are whole; it lies in the folder of outputs, so that taking their place is a change of name.
+    /// Folder of unfinished outputs. It lies in the folder of outputs, so that publishing a file is a rename.
     drafts: UnfinishedFolder,
-    /// Hashes of sensors and priors: many recordings share one.
+    /// Hashes of sensors and priors, which many recordings share.
     shared: Mutex<HashMap<PathBuf, String>>,
 }
 
@@ -40,7 +40,7 @@ impl<'a> Workshop<'a> {
         Ok(Self { args, drafts, shared: Mutex::default() })
     }
 
-    /// Returns the entry of a job before it begins.
+    /// Returns the entry of a job before it runs.
     pub fn entry(&self, job: &Job) -> Entry {
         Entry {
             command: self.args.command.name().to_owned(),
@@ -81,7 +81,7 @@ impl<'a> Workshop<'a> {
         Ok(hash)
     }
 
-    /// Runs the job, and records its result before its output takes its place.
+    /// Runs the job, and records its result before the output is published.
     ///
     /// # Errors
     /// If the folder of outputs cannot be written.
@@ -92,7 +92,7 @@ impl<'a> Workshop<'a> {
         let draft = self.drafts.path().join(job.output.to_string_lossy().replace(['/', '\\'], "|"));
         self.run(job, &draft, entry);
         entry.seconds = start.elapsed().as_secs_f64();
-        // What is found wanting has an output all the same.
+        // `evaluate --check` writes its output even if it fails.
         let wanting = CliError::Check(String::new()).code();
         if entry.state == State::Done || entry.exit_code == Some(wanting.into()) {
             entry.output_sha256 = Some(sha256_of(&draft).map_err(|error| cannot_write(&error))?);
@@ -106,9 +106,9 @@ impl<'a> Workshop<'a> {
         Ok(())
     }
 
-    /// Runs the command to its end; its output is in `draft`.
+    /// Runs the command to its end, with its output in `draft`.
     fn run(&self, job: &Job, draft: &Path, entry: &mut Entry) {
-        // What is said of a draft holds of what it becomes.
+        // Messages name the published output instead of the draft.
         let (drafted, published) =
             (draft.display().to_string(), self.args.output.join(&job.output).display().to_string());
         let said = |text: &str| printable(text).replace(&drafted, &published);

@@ -10,7 +10,7 @@ use crate::commands::score_table::{KEY, add_scores, score_table};
 use crate::error::CliError;
 use crate::output;
 
-/// Version of what `--json` prints.
+/// Version of the output of `--json`.
 const SCHEMA: u32 = 3;
 
 /// All scores, recording by recording.
@@ -26,9 +26,9 @@ pub struct Evaluation {
 struct Json<'a> {
     /// Commit that the program was built from, if known.
     commit: Option<&'static str>,
-    /// Seed of the motions that calibration simulates; nothing else draws.
+    /// Seed of the motions that calibration simulates; nothing else is random.
     simulated_seed: u64,
-    /// All cases summed up, estimate by estimate.
+    /// Summary of all cases, one row per estimate.
     summary: Vec<Summary>,
     recordings: Vec<&'a RecordingScores>,
 }
@@ -44,7 +44,7 @@ impl Evaluation {
         self.recordings.is_empty()
     }
 
-    /// All scores in a row.
+    /// Returns all scores in one sequence.
     pub fn recordings(&self) -> impl Iterator<Item = &RecordingScores> {
         self.recordings.iter().flatten()
     }
@@ -83,14 +83,14 @@ impl Evaluation {
         summaries(self.recordings.iter().map(Vec::as_slice))
     }
 
-    /// One table per recording under its name: filter and smoother of every estimator, then what they are compared with.
+    /// Writes one table per recording, headed by its name: filter and smoother of every estimator, then the baselines.
     fn write_tables(&self, out: &mut dyn Write) -> Result<(), CliError> {
         for scores in &self.recordings {
             let Some(first) = scores.first() else { continue };
             writeln!(out, "{}", first.heading())?;
             let mut table = score_table();
             for of in scores {
-                // Without a part that only one of the two has the other one is as it was.
+                // A part that belongs to only one of filter and smoother leaves the other unchanged.
                 let has_filter = !of.is_part || of.filter != first.filter;
                 let has_smoother = !of.is_part || of.smoother != first.smoother;
                 if has_filter {

@@ -39,7 +39,7 @@ pub fn run(args: &EvaluateArgs, messages: &Messages) -> Result<(), CliError> {
     evaluate(args, messages, &mut Evaluation::default(), |evaluation| print(|out| evaluation.write(out, args.json)))
 }
 
-/// Evaluates into an `evaluation`, which is shown once all that can be scored is.
+/// Evaluates into `evaluation`, which is shown once everything possible has been scored.
 pub fn evaluate(
     args: &EvaluateArgs,
     messages: &Messages,
@@ -56,7 +56,7 @@ pub fn evaluate(
         None if source.leave_one_out => with_each_left_out(args, evaluation, messages),
         None => with_training(args, evaluation, messages),
     };
-    // Calibrations take long: what was scored before an error is still good.
+    // Calibrations take long: scores from before an error remain valid.
     if judged.is_ok() || !evaluation.is_empty() {
         show(evaluation)?;
     }
@@ -95,7 +95,7 @@ fn with_splits(args: &EvaluateArgs, evaluation: &mut Evaluation, messages: &Mess
     Ok(())
 }
 
-/// A recording with parameters from some of its rows, scored on the others.
+/// Calibrates on some rows of a recording, and scores the others.
 fn with_split(
     args: &EvaluateArgs,
     recording: &TraceFile,
@@ -121,7 +121,7 @@ fn with_training(args: &EvaluateArgs, evaluation: &mut Evaluation, messages: &Me
     let progress = Progress::new("calibrating", messages);
     let read = |path| read(args, path);
     let training: Vec<TraceFile> = args.calibration.train.iter().map(|path| read(path)).collect::<Result<_, _>>()?;
-    // All are read before anything is calibrated, so that a wrong name costs no time.
+    // All recordings are read before any calibration, so that a wrong name costs no time.
     let tests: Vec<TraceFile> = args.test.iter().map(|path| read(path)).collect::<Result<_, _>>()?;
     let (sensors, rivals) = calibrated(&training, args, &progress)?;
     progress.doing("scoring");
@@ -149,8 +149,8 @@ fn with_each_left_out(args: &EvaluateArgs, evaluation: &mut Evaluation, messages
     Ok(())
 }
 
-/// Adds scores in the order of the recordings, whichever was done first, up to the first that has none. Warnings wait
-/// until then, so that they come in order, too.
+/// Adds scores in the order of the recordings, whichever finished first, and stops at the first recording without any. Warnings
+/// wait, so that they come in the same order.
 fn add_until_error(
     evaluation: &mut Evaluation,
     judged: Vec<Result<Judged, CliError>>,
@@ -169,7 +169,7 @@ fn read(args: &EvaluateArgs, path: &Path) -> Result<TraceFile, CliError> {
     input::read(path, &args.units.metadata())
 }
 
-/// One sensor per estimator, and the baselines, from the same rows.
+/// Calibrates one sensor per estimator, and the baselines, on the same rows.
 fn calibrated(
     training: &[TraceFile],
     args: &EvaluateArgs,
@@ -190,11 +190,11 @@ fn calibrated(
 struct Judged {
     scores: Vec<RecordingScores>,
     warnings: Vec<String>,
-    /// The report, of the first recording.
+    /// Report on the first recording.
     drawn: Option<Drawn>,
 }
 
-/// Scores of every sensor on some rows of a recording.
+/// Scores every sensor on some rows of a recording.
 fn judge(
     args: &EvaluateArgs,
     recording: &TraceFile,

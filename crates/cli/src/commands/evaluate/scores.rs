@@ -4,17 +4,17 @@ use serde::Serialize;
 use super::settled::SettledScores;
 use ohmstrain_report::Sample;
 
-/// One recording and one estimator: the filter's scores, the smoother's, and those they are compared with.
+/// Scores of the filter, the smoother and the baselines for one recording and one estimator.
 #[derive(Serialize)]
 pub struct RecordingScores {
     pub file: String,
     /// SHA-256 of the recording's bytes, hexadecimal.
     pub sha256: String,
-    /// Share of the rows that calibrated, if the rest of them was scored.
+    /// Share of the rows used for calibration, if the rest was scored.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub split: Option<String>,
     pub estimator: &'static str,
-    /// Name of the known strains that the reference gave to the estimator, if it gave any.
+    /// Name of the known strains that the estimator received from the reference, if any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub known: Option<String>,
     /// Overlap of the scored rows with the calibration.
@@ -26,12 +26,12 @@ pub struct RecordingScores {
     #[serde(flatten)]
     pub filter: Scores,
     pub smoother: Scores,
-    /// Scores of the filter's settled readings, if rows of long holds are scored.
+    /// Scores of the filter's settled readings, if long holds are scored.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub settled: Option<SettledScores>,
     /// Wall-clock time of the calibration, s; `None` if it was read from a file.
     pub calibration_s: Option<f64>,
-    /// Lag of the reference, where it was looked for; `None` inside if it is unknown.
+    /// Lag of the reference, s, if it was estimated; the inner `None` is an unknown lag.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lag_s: Option<Option<f64>>,
     pub baselines: BaselineScores,
@@ -51,18 +51,18 @@ pub struct BaselineScores {
     pub learned: Option<LearnedScores>,
 }
 
-/// Scores of what is fitted for comparison and written nowhere.
+/// Scores of models that are fitted for comparison and not stored.
 #[derive(Clone, Copy, Serialize)]
 pub struct LearnedScores {
     pub fir_20s: Scores,
     pub low_pass_mode: Scores,
     pub leaky_bank: Scores,
-    /// Scores of the published law, with known phases; `None` if the motion of calibration had one direction only.
+    /// Scores of the published law, with known phases; `None` if the calibration moved in one direction only.
     pub relaxing_modulus: Option<Scores>,
 }
 
 impl BaselineScores {
-    /// Returns the scores with the names of the table.
+    /// Returns the scores with their names in the table.
     pub fn named(&self) -> impl Iterator<Item = (&'static str, Scores)> {
         let learned = self.learned.map(|learned| {
             [
@@ -77,17 +77,17 @@ impl BaselineScores {
 }
 
 impl RecordingScores {
-    /// Its name in tables.
+    /// Returns its name in tables.
     pub fn name(&self) -> String {
         self.known.as_ref().map_or_else(|| self.estimator.into(), |known| format!("{}, {known}", self.estimator))
     }
 
-    /// The recording and, where there is one, the split.
+    /// Returns the recording and, if there is one, the split.
     pub fn case(&self) -> String {
         self.split.as_ref().map_or_else(|| self.file.clone(), |split| format!("{} {split}", self.file))
     }
 
-    /// The case, what its errors are errors of, and what else is known of it.
+    /// Returns the case, the quantity of its errors, and further facts.
     pub fn heading(&self) -> String {
         let unit = match self.quantity {
             Quantity::Strain => "strain",

@@ -33,16 +33,16 @@ pub struct JudgedSensor {
     name: &'static str,
 }
 
-/// Estimators that the sensor is compared with.
+/// Baselines that the sensor is compared with.
 pub struct Rivals {
     pub static_cubic: StaticCubic,
-    /// The others, where there are rows to fit them to.
+    /// The other baselines, if there are rows to fit them to.
     pub learned: Option<Baselines>,
-    /// The published law, where these move both ways.
+    /// The published law, if those rows move in both directions.
     pub published: Option<PublishedLaw>,
 }
 
-/// Returns the phases of the body's motion, by the reference.
+/// Returns the phases of the body's motion, from the reference.
 pub fn phases(time_s: &[f64], strain: &[f64]) -> Vec<PhaseRows> {
     segment(time_s, strain).into_iter().map(|segment| (segment.phase, segment.rows)).collect()
 }
@@ -67,8 +67,8 @@ impl JudgedSensor {
         Ok(kinds.into_iter().map(judged).collect())
     }
 
-    /// Calibrates a sensor for each requested estimator, as `calibrate --estimator` does; at least one. After a correction comes the
-    /// filter that it corrects, as a part.
+    /// Calibrates a sensor for each requested estimator, at least one, as `calibrate --estimator` does. A correction is
+    /// followed by the filter that it corrects, as a part.
     pub fn calibrated(
         training: &[TraceFile],
         estimators: Estimators,
@@ -97,7 +97,7 @@ impl JudgedSensor {
         };
         let calibrated = wanted.iter().map(|kind| calibrate(*kind)).collect::<Result<Vec<_>, CliError>>()?;
         let sensors = calibrated.into_iter().flatten().flatten();
-        // A part that was asked for by itself is not shown twice.
+        // A part that was requested by itself is not shown twice.
         Ok(sensors.filter(|sensor| !(sensor.is_part && wanted.contains(&sensor.kind))).collect())
     }
 
@@ -106,8 +106,8 @@ impl JudgedSensor {
         self.is_part
     }
 
-    /// Scores on some rows of a recording, the filter started at the first, of strains that are `told`; `None` without a
-    /// reference. What casts doubt on them is added to `warnings`.
+    /// Scores some rows of a recording, with the filter started at the first row and given the strains of `told`; `None`
+    /// without a reference. Doubts about those strains are added to `warnings`.
     pub fn judge(
         &self,
         recording: &TraceFile,
@@ -152,7 +152,7 @@ impl JudgedSensor {
 }
 
 impl Rivals {
-    /// Scores on some rows of a recording, whose readings times `moved` are as those of the calibration; `None` without a
+    /// Scores some rows of a recording, whose readings times `moved` match those of the calibration; `None` without a
     /// reference.
     pub fn scores(&self, recording: &TraceFile, part: Scored, moved: f64) -> Option<BaselineScores> {
         let learned = match &self.learned {

@@ -9,34 +9,35 @@ use serde::Serialize;
 
 use crate::error::CliError;
 
-/// Shorter holds, s, end before readings have settled.
+/// Shortest hold that is scored, s; readings have not settled in shorter ones.
 const LEAST_HOLD_S: f64 = 60.0;
-/// Rows are scored from so long after a hold's start, s, to so long before its end.
+/// Scored rows begin this long after a hold's start, s, and end `BEFORE_END_S` before its end.
 const FROM_S: f64 = 2.0;
 const BEFORE_END_S: f64 = 10.0;
 /// Time after a hold's start, s, up to which a row counts as early.
 const EARLY_S: f64 = 30.0;
 
-/// Scores of the settled resistance in the rows of holds as a prediction of the reading at their ends. In the unit of the readings.
+/// Scores of the settled resistance in the rows of holds, as a prediction of the reading at the hold's end, in the unit of the
+/// readings.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct SettledScores {
-    /// Holds of a minute or longer of which every row is scored.
+    /// Number of holds of at least a minute in which every row is scored.
     holds: usize,
-    /// Rows in them, without the first seconds and the last ones.
+    /// Number of rows in them, without the first and the last seconds.
     n: usize,
-    /// Share of them whose 95 % interval holds the last reading.
+    /// Share of the rows whose 95 % interval contains the last reading of the hold.
     coverage_95: f64,
-    /// Coverage of rows of the first half minute.
+    /// The same share for rows of the first half minute.
     early_coverage_95: f64,
     rmse: f64,
     width_95: f64,
     crps: f64,
-    /// RMSE of the rows' own readings.
+    /// RMSE of the rows' own readings as such a prediction.
     reading_rmse: f64,
 }
 
 impl SettledScores {
-    /// Computes the scores for the holds of a recording, whose strains have a range of `span`; `None` without a long one.
+    /// Computes the scores for the holds of a recording whose strains have a range of `span`; `None` without a long hold.
     pub fn new(
         recording: &TraceFile,
         estimates: &[Estimate],

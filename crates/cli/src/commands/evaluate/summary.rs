@@ -8,22 +8,22 @@ use crate::commands::score_table::covered;
 use crate::error::CliError;
 use crate::output::table;
 
-/// All cases of one estimate in a row of figures. A case is a recording and a split of it.
+/// Summary of all cases of one estimate. A case is a recording and a split of it.
 #[derive(Debug, Serialize)]
 pub struct Summary {
     /// The estimate's name.
     estimate: String,
-    /// Cases.
+    /// Number of cases.
     cases: usize,
-    /// Geometric mean of the error over the static cubic's on the same rows.
+    /// Geometric mean of the ratio of the error to that of the static cubic on the same rows.
     ratio: f64,
     /// Geometric mean of the error, %FS.
     percent_fs: f64,
     /// The largest such ratio.
     worst_ratio: f64,
-    /// The case that it belongs to.
+    /// The case with that ratio.
     worst_case: String,
-    /// Mean of the CRPS, %FS.
+    /// Mean CRPS, %FS.
     crps_percent_fs: f64,
     /// Mean of the 95 % interval's width, %FS; `None` for estimates without a deviation.
     width_95_percent_fs: Option<f64>,
@@ -31,11 +31,11 @@ pub struct Summary {
     coverage_50: Option<f64>,
     coverage_90: Option<f64>,
     coverage_95: Option<f64>,
-    /// The least coverage of the 95 % interval.
+    /// Smallest coverage of the 95 % interval.
     least_coverage_95: Option<f64>,
 }
 
-/// One case of one estimate: its name, the case's, its scores and those of the static cubic.
+/// One case of one estimate: both names, its scores and those of the static cubic.
 struct Case {
     estimate: String,
     name: String,
@@ -43,7 +43,7 @@ struct Case {
     cubic_rmse: f64,
 }
 
-/// Estimates in the order in which they first appear; the recordings' first estimator brings the baselines.
+/// Returns a summary per estimate, in order of first appearance; the recordings' first estimator brings the baselines.
 pub fn summaries<'a>(recordings: impl Iterator<Item = &'a [RecordingScores]>) -> Vec<Summary> {
     let mut cases: Vec<Case> = Vec::new();
     for scores in recordings {
@@ -71,7 +71,7 @@ pub fn summaries<'a>(recordings: impl Iterator<Item = &'a [RecordingScores]>) ->
     names.iter().filter_map(of).collect()
 }
 
-/// `None` without a case.
+/// Sums up the cases; `None` without a case.
 fn summary(estimate: &str, cases: Vec<&Case>) -> Option<Summary> {
     let count = cases.len() as f64;
     let ratio = |case: &Case| case.scores.rmse / case.cubic_rmse;
@@ -99,7 +99,7 @@ fn summary(estimate: &str, cases: Vec<&Case>) -> Option<Summary> {
     })
 }
 
-/// A table, one estimate per row.
+/// Writes a table, one estimate per row.
 pub fn write(summaries: &[Summary], out: &mut dyn Write) -> Result<(), CliError> {
     let mut table =
         table(["all cases", "cases", "%FS", "/ cubic", "worst", "50/90/95 %", "least 95 %", "width", "CRPS"]);

@@ -4,10 +4,11 @@ use ohmstrain_sensor::RangeParams;
 
 use ohmstrain::trace::TraceFile;
 
-/// Largest distance from an end of the reference's range at which a strain counts as one at that end, in ranges.
+/// Largest distance of a strain from an end of the reference's range at which it counts as being at that end, as a share of the
+/// range.
 const NEAR_END: f64 = 0.1;
 
-/// Strains that the reference tells an estimator before it is scored with it.
+/// Known strains that an estimator receives from the reference before it is scored with it.
 pub struct Told {
     /// Name in tables; `None` if there are no known strains.
     pub name: Option<String>,
@@ -16,8 +17,8 @@ pub struct Told {
 }
 
 impl Told {
-    /// Returns the cases: no known strain; if a time between them is given, s, one known strain after every such time, and the first ones
-    /// near the ends of the range. All of them lie in the part that is scored, and in the range that an estimator accepts.
+    /// Returns the cases: no known strain; and, if an interval in s is given, one known strain after each such interval, and
+    /// the first strains near the ends of the range. All of them lie in the scored part, and within the estimator's limits.
     pub fn cases(recording: &TraceFile, part: Scored, limits: RangeParams, every_s: Option<f64>) -> Vec<Self> {
         let mut cases = vec![Self { name: None, known: Vec::new() }];
         if let Some(every_s) = every_s {

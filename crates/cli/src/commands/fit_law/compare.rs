@@ -11,7 +11,7 @@ use crate::messages::Messages;
 use crate::output::{json, print};
 use ohmstrain::number::{fixed, significant};
 
-/// Version of what `--json` prints.
+/// Version of the output of `--json`.
 const SCHEMA: u32 = 1;
 
 /// Content of the output of `--json`.
@@ -32,13 +32,13 @@ struct Ranked {
     unit: &'static str,
     aicc: f64,
     bic: f64,
-    /// Above the least of the segment.
+    /// Difference from the smallest AICc of the segment.
     delta_aicc: f64,
     delta_bic: f64,
     residual_autocorrelation: f64,
 }
 
-/// One row per segment and law, the best of a segment first.
+/// Prints one row per segment and law, the best law of a segment first.
 pub fn compare(recordings: &[TraceFile], args: &FitLawArgs, messages: &Messages) -> Result<(), CliError> {
     let mut ranked = Vec::new();
     for recording in recordings {

@@ -1,4 +1,4 @@
-//! A figure per fit: readings, law, and what is left.
+//! A figure per fit: readings, law and residuals.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use crate::output::Outputs;
 use ohmstrain::MADE_BY;
 use ohmstrain_report::{Axis, Chart, Ink, ReportError, WIDE, files, slug};
 
-/// Figures of all fits into a folder.
+/// Writes the figures of all fits into a folder.
 pub fn put(folder: &Path, recordings: &[Fits], force: bool) -> Result<(), CliError> {
     let mut outputs = Outputs::new(force, &[]);
     outputs.folder(folder)?;
@@ -18,7 +18,7 @@ pub fn put(folder: &Path, recordings: &[Fits], force: bool) -> Result<(), CliErr
         .enumerate()
         .map(|(place, (recording, fitted))| {
             let title = format!("{} {}", fitted.piece.law, fitted.piece.label);
-            // Recordings may have pieces of the same names.
+            // Pieces of different recordings may have the same name.
             let name = format!("{:02}-{}", place + 1, slug(&title));
             files(&chart(recording, fitted), &title, &name, MADE_BY)
         })
@@ -28,7 +28,7 @@ pub fn put(folder: &Path, recordings: &[Fits], force: bool) -> Result<(), CliErr
 }
 
 fn chart(recording: &Fits, Fitted { piece, fit }: &Fitted) -> Chart {
-    // A hold's times go on from its movement's.
+    // Times of a hold continue those of its movement.
     let time = |datum: &ohmstrain_calib::closed_form::Datum| {
         let before_s = datum.at.before.filter(|_| piece.phase != Some(ohmstrain_model::Phase::Hold));
         datum.at.elapsed_s + before_s.map_or(0.0, |before| before.duration_s)

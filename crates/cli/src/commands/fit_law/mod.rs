@@ -26,13 +26,13 @@ pub struct Fitted {
     pub fit: ClosedFormFit,
 }
 
-/// A recording and what was fitted to it.
+/// A recording and the laws fitted to it.
 pub struct Fits {
     /// Name in messages.
     pub name: String,
-    /// Material by its metadata.
+    /// Material, from the metadata.
     pub material: Option<String>,
-    /// Length of the unstretched sensor, mm, if the metadata have it.
+    /// Length of the unstretched sensor, mm, if the metadata contain it.
     pub gauge_length_mm: Option<f64>,
     /// Unit of the readings, `1` for a ratio.
     pub reading_unit: &'static str,
@@ -42,7 +42,7 @@ pub struct Fits {
     pub fits: Vec<Fitted>,
 }
 
-/// Speeds that differ by more than this share of the largest are several.
+/// Speeds that differ by more than this share of the largest count as different.
 pub const SAME_SPEED: f64 = 0.1;
 
 /// Fits the law to the chosen segments of each recording.
@@ -115,7 +115,7 @@ fn fit_recording(recording: &TraceFile, args: &FitLawArgs, messages: &Messages) 
     })
 }
 
-/// Pieces of the same law and phase become one.
+/// Joins pieces of the same law and phase.
 fn pooled(pieces: Vec<Piece>) -> Vec<Piece> {
     let mut out: Vec<Piece> = Vec::new();
     for piece in pieces {
@@ -133,7 +133,7 @@ fn has_several_speeds(piece: &Piece) -> bool {
     matches!(piece.law, ClosedForm::Eq8 | ClosedForm::Eq8And9) && high - low > SAME_SPEED * high
 }
 
-/// Name of a piece's phase in output.
+/// Returns the name of a piece's phase in the output.
 fn phase_of(piece: &Piece) -> &'static str {
     piece.phase.map_or("whole", phase_name)
 }

@@ -11,7 +11,7 @@ use crate::messages::Messages;
 use crate::output::{self, print};
 use ohmstrain::number::plain;
 
-/// Version of what `--json` prints.
+/// Version of the output of `--json`.
 const SCHEMA: u32 = 1;
 
 /// Content of the output of `--json`.
@@ -27,7 +27,7 @@ struct FitReport<'a> {
     segment: &'a str,
     phase: &'static str,
     law: String,
-    /// Modulus in equations 8 and 9.
+    /// Shape of the modulus in equations 8 and 9.
     modulus: Option<String>,
     from_s: f64,
     until_s: f64,
@@ -54,7 +54,7 @@ struct ParameterReport<'a> {
     at_limit: bool,
 }
 
-/// Prints everything that was computed.
+/// Prints all results as JSON.
 pub fn json(recordings: &[Fits], args: &FitLawArgs) -> Result<(), CliError> {
     let of = |recording| move |fitted| fit_report(recording, fitted, args);
     let fits = recordings.iter().flat_map(|recording| recording.fits.iter().map(of(recording))).collect();
@@ -93,7 +93,7 @@ fn fit_report<'a>(recording: &'a Fits, Fitted { piece, fit }: &'a Fitted, args: 
     }
 }
 
-/// One row per fit.
+/// Returns a table with one row per fit.
 pub fn table(recordings: &[Fits]) -> LawTable {
     let fits = || recordings.iter().flat_map(|recording| recording.fits.iter().map(move |fitted| (recording, fitted)));
     let names = names(fits().map(|(_, fitted)| fitted));
@@ -116,7 +116,7 @@ pub fn table(recordings: &[Fits]) -> LawTable {
     LawTable { keys: 2, header, rows }
 }
 
-/// Names of all parameters and derived quantities, each once.
+/// Returns the names of all parameters and derived quantities, each once.
 pub fn names<'a>(fits: impl Iterator<Item = &'a Fitted>) -> Vec<String> {
     let mut out: Vec<String> = Vec::new();
     for fitted in fits {
@@ -129,7 +129,7 @@ pub fn names<'a>(fits: impl Iterator<Item = &'a Fitted>) -> Vec<String> {
     out
 }
 
-/// Names with the units that their values have; without where recordings differ, or the name has it.
+/// Returns names with the units of their values; no unit if recordings differ in it, or if the name contains it.
 pub fn with_units<'a>(names: &[String], fits: impl Iterator<Item = (&'a Fits, &'a Fitted)> + Clone) -> Vec<String> {
     let of = |name: &String| {
         let units: BTreeSet<String> = fits
@@ -149,7 +149,7 @@ pub fn with_units<'a>(names: &[String], fits: impl Iterator<Item = (&'a Fits, &'
 
 /// R² below which a law hardly describes a segment.
 pub const POOR: f64 = 0.9;
-/// Segments that are warned of one by one; more are counted.
+/// Number of segments with a warning of their own; further ones are only counted.
 const MOST_WARNED: usize = 6;
 
 /// Warns of fits that are poor, did not converge, or end at a limit of the search.
@@ -157,7 +157,7 @@ pub fn warn(recordings: &[Fits], messages: &Messages) {
     recordings.iter().for_each(|recording| warn_of(recording, "", messages));
 }
 
-/// The same of one law of several.
+/// Does the same for one law of several.
 pub fn warn_of_law(recording: &Fits, law: &str, messages: &Messages) {
     warn_of(recording, &format!("{law}: "), messages);
 }

@@ -15,11 +15,11 @@ pub struct Piece {
     pub label: String,
     /// The law to fit.
     pub law: ClosedForm,
-    /// Its phase, the movement's where there are two; `None` for a whole recording.
+    /// Its phase; that of the movement if there are two; `None` for a whole recording.
     pub phase: Option<Phase>,
-    /// The movement before, if this is a hold alone.
+    /// The preceding movement, if this is a hold alone.
     pub after: Option<Phase>,
-    /// Mean speed of the movement, or of the one before, in strain per second; `None` where there is none.
+    /// Mean speed, in strain per second, of the movement or of the preceding one; `None` if there is neither.
     pub speed_per_s: Option<f64>,
     /// Time of its first row, s.
     pub from_s: f64,
@@ -30,7 +30,7 @@ pub struct Piece {
 }
 
 impl Piece {
-    /// Takes the readings of another one.
+    /// Appends the readings of another piece.
     pub fn join(&mut self, other: Self) {
         self.label = format!("{},{}", self.label, other.label);
         self.until_s = other.until_s;
@@ -74,7 +74,7 @@ const fn is_about(law: ClosedForm, phase: Phase) -> bool {
     }
 }
 
-/// Laws of time alone fit anything that relaxes; the others need their phase.
+/// Checks that the law fits the chosen phase. Laws of time alone fit any relaxation; the others need their own phase.
 fn check(law: ClosedForm, choice: SegmentChoice) -> Result<(), CliError> {
     let bound = matches!(law, ClosedForm::Eq8 | ClosedForm::Eq9 | ClosedForm::Tunnelling);
     match choice {
@@ -145,12 +145,12 @@ struct Cutter<'a> {
 }
 
 impl Cutter<'_> {
-    /// One piece per segment.
+    /// Returns one piece per segment.
     fn singles(&self, args: &FitLawArgs) -> Vec<Piece> {
         let wanted = |i: &usize| {
             let own = &self.segments[*i];
             if args.segment.is_empty() {
-                // What rests before the first movement does not relax.
+                // Rest before the first movement has nothing to relax from.
                 is_about(args.law, own.segment.phase) && (!own.is_hold() || self.before(*i).is_some())
             } else {
                 own.is_chosen(&args.segment)
@@ -159,7 +159,7 @@ impl Cutter<'_> {
         (0..self.segments.len()).filter(wanted).map(|i| self.single(i, args.law)).collect()
     }
 
-    /// Movements with the hold after them; for the table of all, what stands alone too.
+    /// Returns movements, each with the following hold; for the table of all, also segments that stand alone.
     fn pairs(&self, args: &FitLawArgs) -> Vec<Piece> {
         let chosen = |own: &Numbered| args.segment.is_empty() || own.is_chosen(&args.segment);
         let mut out = Vec::new();
@@ -204,7 +204,7 @@ impl Cutter<'_> {
         }
     }
 
-    /// The movement before a hold.
+    /// Returns the movement before a hold.
     fn before(&self, i: usize) -> Option<&Numbered> {
         i.checked_sub(1).map(|before| &self.segments[before])
     }

@@ -18,7 +18,7 @@ struct Entry<'a> {
 /// Order of the phases in the table.
 const PHASES: [&str; 5] = ["extend", "hold", "retract", "rest", "whole"];
 
-/// One row per material, speed and phase.
+/// Returns a table with one row per material, speed and phase.
 pub fn table(recordings: &[Fits]) -> LawTable {
     let in_mm = recordings.iter().all(|recording| recording.gauge_length_mm.is_some());
     let mut entries: Vec<Entry> = recordings.iter().flat_map(|recording| entries(recording, in_mm)).collect();
@@ -40,7 +40,7 @@ pub fn table(recordings: &[Fits]) -> LawTable {
     LawTable { keys: 3, header, rows }
 }
 
-/// Warns of a phase that a law does not describe, though it describes both of its phases together.
+/// Warns of a phase that a law does not describe, although it describes both phases together.
 pub fn warn(recordings: &[Fits], messages: &Messages) {
     for recording in recordings {
         for entry in entries(recording, false) {
@@ -55,7 +55,7 @@ pub fn warn(recordings: &[Fits], messages: &Messages) {
     }
 }
 
-/// Neighbours in the order of speeds.
+/// True if two neighbours in the order of speeds count as equally fast.
 fn is_same_speed(a: Option<f64>, b: Option<f64>) -> bool {
     match (a, b) {
         (Some(a), Some(b)) => b - a <= SAME_SPEED * b,
@@ -63,7 +63,7 @@ fn is_same_speed(a: Option<f64>, b: Option<f64>) -> bool {
     }
 }
 
-/// A movement and its hold are two entries of one fit.
+/// Returns the entries of all fits; a movement and its hold are two entries of one fit.
 fn entries(recording: &Fits, in_mm: bool) -> Vec<Entry<'_>> {
     let scale = recording.gauge_length_mm.filter(|_| in_mm).unwrap_or(1.0);
     let mut out = Vec::new();
@@ -96,12 +96,12 @@ fn entries(recording: &Fits, in_mm: bool) -> Vec<Entry<'_>> {
     out
 }
 
-/// Returns the file's name, for a recording without a material, which stands for itself.
+/// Returns the name of the file, which replaces the material if that is unknown.
 fn file_name(path: &str) -> &str {
     path.rsplit(['/', '\\']).next().unwrap_or(path)
 }
 
-/// R² of the readings of one phase about their own mean.
+/// Returns R² of the readings of one phase about their own mean.
 fn r_squared(fitted: &Fitted, is_in: impl Fn(&Datum) -> bool) -> f64 {
     let both = || fitted.piece.data.iter().zip(&fitted.fit.residuals).filter(|(datum, _)| is_in(datum));
     let n = both().count() as f64;
@@ -110,7 +110,7 @@ fn r_squared(fitted: &Fitted, is_in: impl Fn(&Datum) -> bool) -> f64 {
     1.0 - both().map(|(_, residual)| residual * residual).sum::<f64>() / about_mean
 }
 
-/// True if a parameter belongs to a phase: those of the hold are in its row, time constants and shares in both.
+/// True if a parameter is shown for a phase: the hold's own in its row, time constants and shares in both.
 fn belongs(name: &str, phase: &str) -> bool {
     let of_hold = ["r0_hold", "r1_hold", "r_start", "r_settled"].iter().any(|start| name.starts_with(start));
     let of_movement = name == "r0"
@@ -124,7 +124,7 @@ fn belongs(name: &str, phase: &str) -> bool {
     }
 }
 
-/// Means over the fits of a group, with their standard errors.
+/// Returns the means over the fits of a group, with their standard errors.
 fn row(group: &[Entry], names: &[String]) -> Vec<Cell> {
     let first = &group[0];
     let speeds: Vec<f64> = group.iter().filter_map(|entry| entry.speed).collect();
@@ -145,7 +145,7 @@ fn row(group: &[Entry], names: &[String]) -> Vec<Cell> {
     out
 }
 
-/// Mean of values with its standard error: the fit's own for one value, from the scatter for more.
+/// Returns the mean of values with its standard error: the fit's own for one value, else from the scatter.
 fn mean(found: &[(f64, f64)]) -> Cell {
     match found {
         [] => Cell::Nothing,

@@ -11,15 +11,15 @@ use ohmstrain::number::{plain, with_error};
 pub enum Cell {
     /// Words.
     Text(String),
-    /// A number, and how it is to be read.
+    /// A number with its formatted text.
     Number(f64, String),
     /// A value with its standard error.
     Estimate(f64, f64),
     /// A value at the limit of the search.
     AtLimit(f64),
-    /// The readings do not tell it.
+    /// A parameter that the readings do not determine.
     NotTold,
-    /// No parameter.
+    /// No such parameter in this row.
     Nothing,
 }
 
@@ -44,7 +44,7 @@ impl Cell {
         }
     }
 
-    /// Value and standard error, with all digits.
+    /// Formats value and standard error with all digits.
     fn csv(&self, has_error: bool) -> String {
         let value = match self {
             Self::Text(text) => quoted(text),
@@ -83,7 +83,7 @@ impl LawTable {
     fn text(&self) -> String {
         let rows: Vec<Vec<String>> = self.rows.iter().map(|row| row.iter().map(Cell::text).collect()).collect();
         let mut text = String::new();
-        // What all rows have in common stands above them.
+        // Cells that all rows share stand above the table.
         let shared =
             rows.first().filter(|first| self.header[0] == "recording" && rows.iter().all(|row| row[0] == first[0]));
         if let Some(shared) = shared {
@@ -101,7 +101,7 @@ impl LawTable {
         text
     }
 
-    /// The columns behind the keys, as many together as fit a terminal beside these.
+    /// Splits the columns after the keys into blocks; as many as fit a terminal beside the keys form one block.
     fn blocks(&self, rows: &[Vec<String>], keys: &[usize]) -> Vec<Vec<usize>> {
         let width = |column: &usize| {
             let cells = rows.iter().map(|row| &row[*column]).chain([&self.header[*column]]);
@@ -125,7 +125,7 @@ impl LawTable {
         blocks
     }
 
-    /// Formats it as CSV with a column of standard errors behind that of each parameter.
+    /// Formats the table as CSV, with a column of standard errors after each parameter.
     fn csv(&self) -> String {
         let is_estimate = |row: &Vec<Cell>, column: usize| matches!(row.get(column), Some(Cell::Estimate(..)));
         let has_error = |column: usize| self.rows.iter().any(|row| is_estimate(row, column));
@@ -141,7 +141,7 @@ impl LawTable {
         text
     }
 
-    /// A `tabular` with the rules of the package booktabs.
+    /// Formats the table as a LaTeX `tabular` with the rules of the package booktabs.
     fn latex(&self) -> String {
         let line = |cells: Vec<String>| cells.join(" & ") + " \\\\\n";
         let mut text = format!(
@@ -161,11 +161,11 @@ fn quoted(text: &str) -> String {
     if text.contains([',', '"', '\n']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.into() }
 }
 
-/// Superscripts and what stands for them.
+/// Superscripts and their replacements.
 const POWERS: &str = "⁻⁰¹²³⁴⁵⁶⁷⁸⁹";
 const POWER_DIGITS: &str = "-0123456789";
 
-/// A cell as LaTeX takes it.
+/// Escapes the text of a cell for LaTeX.
 fn escaped(text: &str) -> String {
     let mut out = String::new();
     let mut in_power = false;

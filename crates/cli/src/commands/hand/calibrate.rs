@@ -1,4 +1,4 @@
-//! Calibration of all channels of a recording: a sensor file for each, and a description of the joints that they belong to.
+//! Calibration of all channels of a recording: a sensor file for each channel, and a description of their joints.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -28,7 +28,7 @@ struct Written {
     joints: Vec<WrittenJoint>,
 }
 
-/// A joint of it: of one channel, or of several.
+/// An entry of `hand.toml`: a joint with one channel or with several.
 #[derive(Serialize)]
 struct WrittenJoint {
     name: String,
@@ -74,7 +74,7 @@ pub fn run(args: &CalibrateArgs, tables: &[Table], messages: &Messages) -> Resul
     print(|out| scores::write(out, &heading, &scored, args.json))
 }
 
-/// Refuses what is for one channel.
+/// Refuses flags that apply to one channel only.
 fn refuse_flags(args: &CalibrateArgs) -> Result<(), CliError> {
     let flags = [
         ("--report", args.report.report.is_some()),
@@ -93,7 +93,8 @@ fn refuse_flags(args: &CalibrateArgs) -> Result<(), CliError> {
     }
 }
 
-/// Channels by the reference that they share. A reference with a name of its own names the joint, one for all is named by the output.
+/// Groups channels by their common reference. A reference with a name of its own names the joint; one for all channels takes
+/// the name of the output.
 fn groups(tables: &[Table], stem: &str) -> Result<Vec<Group>, CliError> {
     let (mut places, mut groups): (BTreeMap<String, usize>, Vec<Group>) = (BTreeMap::new(), Vec::new());
     let first = tables.first().map_or_else(|| Ok(Vec::new()), Table::channels)?;
@@ -122,7 +123,7 @@ fn groups(tables: &[Table], stem: &str) -> Result<Vec<Group>, CliError> {
     Ok(groups)
 }
 
-/// A name of the characters that joints' names may have.
+/// Replaces characters that names of joints may not have.
 fn plain(name: &str) -> String {
     name.chars().map(|c| if c.is_ascii_alphanumeric() || "_-.".contains(c) { c } else { '_' }).collect()
 }
@@ -134,7 +135,7 @@ struct Files {
 }
 
 impl Files {
-    /// Claims them beside the description: hand-index.toml for channel index, hand-fusion.toml.
+    /// Claims the files beside the description: hand-index.toml for the channel index, hand-fusion.toml for the fusion.
     fn claim(group: &Group, hand: &Path, stem: &str, outputs: &mut Outputs) -> Result<Self, CliError> {
         let folder = hand.parent().unwrap_or(Path::new(""));
         let mut claim = |name: String, kind: Kind| -> Result<(PathBuf, Claim), CliError> {
@@ -190,8 +191,8 @@ impl Group {
         Ok((WrittenJoint { name, only: None, fusion: Some(path), channels: entries }, scores))
     }
 
-    /// Recordings of each channel. Where the strain is known in holds only, channels of one joint take the reference of the channel that
-    /// tells it best.
+    /// Returns the recordings of each channel. If the strain is known in holds only, all channels of a joint take the reference
+    /// with the smallest mean variance.
     fn recordings(
         &self,
         args: &CalibrateArgs,
@@ -219,7 +220,7 @@ impl Group {
         Ok(recordings)
     }
 
-    /// The recordings of a channel, as far as they are calibrated on.
+    /// Returns the recordings of a channel, restricted to the rows of the calibration.
     fn traces(&self, args: &CalibrateArgs, tables: &[Table], channel: &Channel) -> Result<Vec<TraceFile>, CliError> {
         let overrides = args.units.metadata();
         let rows = |table: &Table| {
@@ -230,13 +231,13 @@ impl Group {
     }
 }
 
-/// Mean of the squares of known deviations; `None` if none is known.
+/// Returns the mean square of the known deviations; `None` if none is known.
 fn mean_variance(sd: &[f64]) -> Option<f64> {
     let (count, sum) = sd.iter().filter(|sd| sd.is_finite()).fold((0.0, 0.0), |(n, sum), sd| (n + 1.0, sum + sd * sd));
     (count > 0.0).then(|| sum / count)
 }
 
-/// An error with the channel that it is about.
+/// Adds the channel to an error.
 fn named(error: CliError, channel: &Channel) -> CliError {
     match error {
         CliError::Input(text) => CliError::Input(format!("channel `{}`: {text}", channel.column)),
@@ -244,7 +245,7 @@ fn named(error: CliError, channel: &Channel) -> CliError {
     }
 }
 
-/// Fuses the channels of a joint, recordings channel by channel.
+/// Fuses the channels of a joint; `recordings` are those of each channel.
 fn fused(recordings: &[Vec<TraceFile>], calibrated: &[Calibrated]) -> Result<Fused, CliError> {
     let mut known: Vec<Vec<Recording>> = Vec::new();
     for traces in recordings {

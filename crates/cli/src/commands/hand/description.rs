@@ -8,7 +8,7 @@ use crate::error::CliError;
 use crate::sensor_file;
 use crate::whole_file;
 
-/// The version of the file that is read.
+/// Version of the file format.
 pub const FORMAT: u32 = 1;
 
 /// `hand.toml`.
@@ -25,9 +25,9 @@ pub struct Joint {
     pub name: String,
     /// Columns of its readings in the recording, each with its sensor; at least one.
     pub channels: Vec<Channel>,
-    /// The file of how they are fused, from the description's folder; `None` for a joint with one channel.
+    /// File of the fusion, relative to the description's folder; `None` for a joint with one channel.
     pub fusion: Option<PathBuf>,
-    /// The joint that the sensors span, unless they know.
+    /// The joint that the sensors span, unless their files contain it.
     pub joint: Option<JointSpec>,
 }
 
@@ -37,9 +37,9 @@ pub struct Joint {
 pub struct Channel {
     /// Name of the column.
     pub column: String,
-    /// The sensor's file, from the description's folder.
+    /// The sensor's file, relative to the description's folder.
     pub sensor: PathBuf,
-    /// Reading of the rested sensor today.
+    /// Today's reading of the rested sensor.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rest_resistance: Option<f64>,
     /// Electronics, if the column has converter codes.
@@ -47,18 +47,18 @@ pub struct Channel {
     pub front_end: Option<FrontEndSpec>,
 }
 
-/// The file as it is written.
+/// Content of the file.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
     format: u32,
-    /// Program that made it; a description written by hand names none.
+    /// Program that wrote it; a description written by hand has none.
     #[serde(rename = "made_by")]
     _made_by: Option<String>,
     joints: Vec<Entry>,
 }
 
-/// A joint as it is written: one channel in its own table, or several in tables of theirs.
+/// A joint in the file: one channel in its own table, or several in tables of their own.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Entry {
@@ -76,7 +76,7 @@ struct Entry {
 }
 
 impl Entry {
-    /// The joint, or what is missing of it.
+    /// Returns the joint, or names the missing part.
     fn joint(self) -> Result<Joint, &'static str> {
         let Self { name, column, sensor, rest_resistance, front_end, channels, fusion, joint } = self;
         let channels = match (column, sensor) {

@@ -1,4 +1,4 @@
-//! A hand's estimates beside the references of a recording of all its channels.
+//! Scores of a hand's estimates against the references of a recording of all its channels.
 
 use ohmstrain_report::Scored;
 use std::path::Path;
@@ -36,7 +36,7 @@ pub fn run(args: &EvaluateArgs, hand: &Path) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Refuses what is for one sensor.
+/// Refuses flags that apply to one sensor only.
 fn refuse_flags(args: &EvaluateArgs) -> Result<(), CliError> {
     let flags = [
         ("--estimator", !matches!(args.estimator, Estimators::Auto)),

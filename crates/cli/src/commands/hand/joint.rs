@@ -10,7 +10,7 @@ use crate::sensor_file;
 use crate::suits::FIRST_LIVE_READINGS;
 use crate::whole_file;
 
-/// A joint with its channels and the filter of them.
+/// A joint with its channels and their filter.
 pub struct Joint<'a> {
     pub name: &'a str,
     pub channels: Vec<Channel<'a>>,
@@ -41,13 +41,13 @@ pub struct JointRow {
     pub value: f64,
     /// Its standard deviation.
     pub sd: f64,
-    /// Estimate of the quantity that its sensors were calibrated on.
+    /// Estimated strain, in the quantity that the sensors were calibrated on.
     pub strain: f64,
     /// Its standard deviation.
     pub strain_sd: f64,
     /// Flags, each behind the name of the joint or the column.
     pub flags: Vec<String>,
-    /// Estimates of the channels by themselves.
+    /// Estimate of each channel by itself.
     pub channels: Vec<Estimate>,
 }
 
@@ -68,7 +68,7 @@ impl<'a> Joint<'a> {
         Ok(Self { name: &joint.name, channels, fusion, filter })
     }
 
-    /// Endings of its columns in the output.
+    /// Returns the endings of its columns in the output.
     pub fn endings(&self) -> [&'static str; 2] {
         let is_strain = |channel: &Channel| {
             channel.sensor.params().quantity == Quantity::Strain && channel.sensor.params().joint.is_none()
@@ -76,19 +76,19 @@ impl<'a> Joint<'a> {
         if self.channels.iter().all(is_strain) { ["_strain", "_strain_sd"] } else { ["_deg", "_sd_deg"] }
     }
 
-    /// The quantity that its sensors were calibrated on.
+    /// Returns the quantity that its sensors were calibrated on.
     pub fn quantity(&self) -> Quantity {
         self.channels.first().map_or(Quantity::Strain, |channel| channel.sensor.params().quantity)
     }
 
-    /// The clock has started again, and so does the filter.
+    /// Restarts the filter after the clock has restarted.
     pub fn restart(&mut self) -> Result<(), CliError> {
         self.filter = filter(&self.channels, self.fusion.as_ref())?;
         self.channels.iter_mut().for_each(|channel| channel.early.clear());
         Ok(())
     }
 
-    /// Takes the channels' readings.
+    /// Takes the channels' readings, and returns the joint's estimate.
     pub fn step(&mut self, time_s: f64, readings: &[Reading]) -> Result<JointRow, Error> {
         match &mut self.filter {
             JointFilter::One(filter) => {
@@ -115,7 +115,7 @@ impl<'a> Joint<'a> {
     }
 }
 
-/// A filter of the channels that has seen nothing.
+/// Creates a filter of the channels in its initial state.
 fn filter(channels: &[Channel], fusion: Option<&FusedSensor>) -> Result<JointFilter, CliError> {
     let mut filters = channels.iter().map(Channel::filter).collect::<Result<Vec<_>, _>>()?;
     match (fusion, filters.pop()) {
@@ -128,7 +128,7 @@ fn filter(channels: &[Channel], fusion: Option<&FusedSensor>) -> Result<JointFil
     }
 }
 
-/// Angle and standard deviation, degrees: by the joint, or what the sensor was calibrated on.
+/// Returns the angle and its standard deviation, degrees: by the joint, or as calibrated.
 fn angle(estimate: &Estimate) -> (f64, f64) {
     match (estimate.angle_deg, estimate.angle_sd) {
         (Some(angle), Some(sd)) => (angle, sd),
@@ -158,7 +158,7 @@ impl<'a> Channel<'a> {
         self.entry.rest_resistance.map_or(wanted, |measured| wanted.rest_resistance(measured)).build()
     }
 
-    /// The header as this channel sees it: its column is the reading, those of others are passed over.
+    /// Returns the header for this channel: its column is the reading, those of other channels are ignored.
     pub fn header(&self, header: &str) -> Result<String, String> {
         let has = |column: &str| header.split(',').any(|name| name.trim() == column);
         if !has("time_s") && !has("time_us") {
@@ -185,7 +185,8 @@ impl<'a> Channel<'a> {
         Ok(header.split(',').map(cell).collect::<Vec<_>>().join(","))
     }
 
-    /// Returns the unit of the readings by the electronics, the lines above the header or the end of the column's name.
+    /// Returns the unit of the readings according to the electronics, the lines above the header or the ending of the column's
+    /// name.
     fn said_unit(&self) -> Option<ReadingUnit> {
         if self.entry.front_end.is_some() || self.lines.metadata().resistance_unit.is_some() {
             return Some(ReadingUnit::Ohm);
@@ -197,7 +198,7 @@ impl<'a> Channel<'a> {
         }
     }
 
-    /// Doubts the unit of the readings once there are enough of them.
+    /// Checks the unit of the readings once enough are known; returns a doubt.
     pub fn doubt(&mut self, reading: f64) -> Option<String> {
         if !reading.is_finite() || self.early.len() >= FIRST_LIVE_READINGS {
             return None;
@@ -206,7 +207,7 @@ impl<'a> Channel<'a> {
         if self.early.len() < FIRST_LIVE_READINGS { None } else { self.unit_doubt() }
     }
 
-    /// Doubts it where the recording has ended before.
+    /// Checks the unit if the recording has ended before that; returns a doubt.
     pub fn last_doubt(&self) -> Option<String> {
         if self.early.len() < FIRST_LIVE_READINGS { self.unit_doubt() } else { None }
     }
@@ -222,7 +223,7 @@ impl<'a> Channel<'a> {
     }
 }
 
-/// A header that fits a message.
+/// Shortens and quotes a header for a message.
 pub fn quoted(header: &str) -> String {
     const LONGEST: usize = 80;
     let shown: String = header.chars().take(LONGEST).collect();

@@ -1,7 +1,7 @@
-//! Several joints at once: a column of readings for each channel, all angles out.
+//! Several joints at once: one column of readings per channel in, all angles out.
 //!
-//! Each channel has its own view of a line: the line parsed under a header in which its column is the resistance. A line that one of
-//! them cannot read is an error, or skipped for all of them.
+//! Each channel parses every line under a header in which its own column is the resistance. A line that one channel cannot read
+//! is an error, or is skipped for all of them.
 
 pub mod calibrate;
 mod description;
@@ -27,7 +27,7 @@ use joint::{Channel, Joint};
 /// Advice for a clock that has restarted.
 const LATE: &str = "; if the clock has started again there, --skip-bad goes on with other filters";
 
-/// Longer lines are no rows, however they go on.
+/// Longest line, bytes; anything longer is not a row.
 const LONGEST_LINE: u64 = 64 * 1024;
 
 /// Turns readings of all joints into angles, row by row as they arrive.
@@ -59,14 +59,14 @@ pub fn run(args: &HandArgs, messages: &Messages) -> Result<(), CliError> {
     rows_out.publish()
 }
 
-/// Columns of the output.
+/// Returns the columns of the output.
 fn columns(joints: &[Joint]) -> Vec<String> {
     let of_joint = |joint: &Joint| joint.endings().map(|ending| format!("{}{ending}", joint.name));
     let angles = joints.iter().flat_map(of_joint);
     std::iter::once("time_s".to_owned()).chain(angles).chain(["flags".to_owned()]).collect()
 }
 
-/// Channels of all joints.
+/// Returns the channels of all joints.
 fn channels<'j, 'a: 'j>(joints: &'j mut [Joint<'a>]) -> impl Iterator<Item = &'j mut Channel<'a>> {
     joints.iter_mut().flat_map(|joint| &mut joint.channels)
 }
@@ -161,7 +161,7 @@ fn stream<W: Write>(
     Ok(())
 }
 
-/// Warns of a doubt if a reader waits for the rows, and refuses the recording otherwise.
+/// Warns of a doubt if a reader waits for the rows; otherwise refuses the recording.
 fn say(doubt: Option<String>, file: &str, live: bool, messages: &Messages) -> Result<(), CliError> {
     match doubt {
         Some(doubt) if live => messages.warning(&format!("{file}: {doubt}")),
@@ -171,7 +171,7 @@ fn say(doubt: Option<String>, file: &str, live: bool, messages: &Messages) -> Re
     Ok(())
 }
 
-/// All angles of a row.
+/// Writes all angles of a row.
 fn write<W: Write>(joints: &mut [Joint], rows: &[Row], out: &mut RowWriter<W>) -> Result<(), CliError> {
     let time_s = rows.first().map_or(f64::NAN, |row| row.time_s);
     let (mut flags, mut values, mut rest) = (Vec::new(), Vec::new(), rows);

@@ -11,7 +11,7 @@ use crate::error::CliError;
 pub struct JointScores {
     /// Name of the joint.
     pub joint: String,
-    /// Scores of what `hand` reports of it.
+    /// Scores of the joint's estimate as `hand` reports it.
     pub fused: Option<Scores>,
     pub channels: Vec<ChannelScores>,
 }

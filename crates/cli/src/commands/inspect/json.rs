@@ -7,10 +7,10 @@ use super::{Findings, Proposal};
 use crate::error::CliError;
 use crate::output;
 
-/// Version of what `--json` prints.
+/// Version of the output of `--json`.
 const SCHEMA: u32 = 1;
 
-/// Prints what was found as JSON.
+/// Prints the findings as JSON.
 pub fn write(out: &mut dyn Write, findings: &Findings) -> Result<(), CliError> {
     let files: Vec<Value> = (0..findings.tables.len()).map(|index| file(findings, index)).collect();
     let mut all = json!({ "files": files });

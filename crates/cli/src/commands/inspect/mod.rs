@@ -17,9 +17,9 @@ use crate::output::print;
 pub struct Findings {
     /// The files.
     pub tables: Vec<Table>,
-    /// The import that it proposes, or what is to be answered first.
+    /// The proposed import, or the question to be answered first.
     pub plan: Result<Proposal, ImportError>,
-    /// The import of all channels in one recording, if the question is which of them is meant.
+    /// Import of all channels into one recording, if the open question is which channel is meant.
     pub each: Option<Each>,
 }
 
@@ -31,11 +31,11 @@ pub struct Each {
     pub channels: Vec<(String, String, Option<String>)>,
     /// True if each channel has a reference of its own.
     pub are_joints: bool,
-    /// Command that goes on with a file that is such a recording already.
+    /// Next command, if the file is already such a recording.
     pub next: Option<String>,
 }
 
-/// An import and what it leads to.
+/// A proposed import and its result.
 pub struct Proposal {
     /// The import.
     pub plan: Plan,
@@ -45,11 +45,11 @@ pub struct Proposal {
     pub remarks: Vec<String>,
     /// Survey of the trace.
     pub survey: Survey,
-    /// Advice on a file that is a trace already: importing it changes nothing.
+    /// Next command, if the file is already a trace, which an import would not change.
     pub next: Option<String>,
 }
 
-/// Describes the contents of a lab's files, and the import that fits them.
+/// Describes the contents of a lab's files, and the import that suits them.
 pub fn run(args: &InspectArgs) -> Result<(), CliError> {
     let recipe = args.known.recipe();
     args.files.iter().try_for_each(|path| lab_files::refuse_results(path))?;
@@ -75,7 +75,7 @@ pub fn run(args: &InspectArgs) -> Result<(), CliError> {
     print(|out| if args.json { json::write(out, &findings) } else { text::write(out, &findings) })
 }
 
-/// The import of all channels, if nobody has named one, and it works.
+/// Returns the import of all channels, if the user has named no channel and if it works.
 fn each(files: &[PathBuf], tables: &[Table], recipe: &Recipe) -> Option<Each> {
     let is_reading = |role: Role| matches!(role, Role::Resistance | Role::Ratio | Role::Adc);
     if recipe.columns.iter().any(|(role, _)| is_reading(*role)) {
@@ -90,7 +90,7 @@ fn each(files: &[PathBuf], tables: &[Table], recipe: &Recipe) -> Option<Each> {
     Some(Each { command, channels: plan.columns(tables), are_joints: plan.are_joints(), next })
 }
 
-/// A plan that has been tried.
+/// Returns a plan that has been tried.
 fn proposed(tables: &[Table], recipe: &Recipe) -> Result<(Plan, Imported, Survey), ImportError> {
     let plan = Plan::propose(tables, recipe)?;
     let imported = plan.import(tables)?;
@@ -98,9 +98,9 @@ fn proposed(tables: &[Table], recipe: &Recipe) -> Result<(Plan, Imported, Survey
     Ok((plan, imported, survey))
 }
 
-/// The command that uses a file which reads as it would be imported.
+/// Returns the command that uses the file itself, if an import would not change it.
 fn next(files: &[PathBuf], imported: &Trace) -> Option<String> {
-    // What stdin and pipes had in them has been read.
+    // The contents of stdin and pipes are consumed.
     let [file] = files else { return None };
     let trace = file.is_file().then(|| input::read(file, &Metadata::default()).ok())??.trace;
     let numbers = |trace: &Trace| -> Vec<u64> {

@@ -8,12 +8,12 @@ use crate::error::CliError;
 use crate::output;
 use crate::printable::printable;
 
-/// Characters of a cell that are shown.
+/// Largest number of characters that are shown of a cell.
 const WIDEST: usize = 24;
-/// Columns of a file that are shown.
+/// Largest number of columns that are shown of a file.
 const MOST_COLUMNS: usize = 24;
 
-/// Prints what was found, and the command or the question that follows from it.
+/// Prints the findings, and the command or the question that follows from them.
 pub fn write(out: &mut dyn Write, findings: &Findings) -> Result<(), CliError> {
     for (index, table) in findings.tables.iter().enumerate() {
         writeln!(out, "{}: {}", printable(&table.file), table.description())?;
@@ -32,7 +32,7 @@ pub fn write(out: &mut dyn Write, findings: &Findings) -> Result<(), CliError> {
     }
 }
 
-/// Several joints.
+/// Prints the import of several joints.
 fn write_each(out: &mut dyn Write, each: &Each) -> Result<(), CliError> {
     for (name, readings, reference) in &each.channels {
         let reference = reference.as_deref().unwrap_or("none");
@@ -61,7 +61,7 @@ fn write_proposal(out: &mut dyn Write, proposal: &Proposal) -> Result<(), CliErr
     }
 }
 
-/// A row for each column: what it may be, or is proposed to be.
+/// Returns a table with one row per column: its possible or proposed role.
 fn columns(findings: &Findings, index: usize) -> TextTable {
     let table = &findings.tables[index];
     let mut text = output::table(["#", "column", "unit", "taken for", "first", "last"]);
@@ -72,7 +72,7 @@ fn columns(findings: &Findings, index: usize) -> TextTable {
             || found.iter().any(|it| (it.table, it.column) == (index, place))
     };
     let mut shown: Vec<usize> = (0..table.columns.len()).collect();
-    // The columns that are something first, if not all can be shown.
+    // Columns with a role come first, if not all can be shown.
     shown.sort_by_key(|place| (table.columns.len() > MOST_COLUMNS && !is_something(*place), *place));
     shown.truncate(MOST_COLUMNS);
     shown.sort_unstable();
@@ -101,7 +101,7 @@ fn columns(findings: &Findings, index: usize) -> TextTable {
     text
 }
 
-/// Foreign text that fits a cell.
+/// Shortens foreign text to fit a cell.
 fn short(text: &str) -> String {
     let shown = printable(text);
     let cut: String = shown.chars().take(WIDEST).collect();

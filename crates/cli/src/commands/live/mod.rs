@@ -1,7 +1,7 @@
 //! Strain in the terminal while readings arrive.
 //!
-//! A thread reads lines; this one filters them and draws. No line stops the view: what is none of a trace is counted, a
-//! port that goes away is waited for. Only a stream that is not of this sensor ends it, and the key q.
+//! A thread reads lines; this one filters them and draws. No line stops the view: invalid lines are counted, and a lost port is
+//! waited for. Only a stream from another sensor, or the key q, ends the view.
 
 mod recorder;
 mod session;
@@ -22,12 +22,12 @@ use crate::port::Feed;
 use crate::sensor_file;
 use session::Session;
 
-/// Time for which a key is waited for.
+/// Longest wait for a key.
 const KEY_WAIT: Duration = Duration::from_millis(10);
 /// Time between two drawings.
 const FRAME: Duration = Duration::from_millis(50);
 
-/// Shows strain until the user has seen enough.
+/// Shows strain until the user quits.
 pub fn run(args: &LiveArgs, messages: &Messages) -> Result<(), CliError> {
     if !io::stdout().is_terminal() {
         return Err(CliError::Arguments(

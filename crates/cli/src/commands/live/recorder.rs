@@ -8,28 +8,28 @@ use ohmstrain_bench_data::{LineParser, ReadingKind, ReferenceQuantity, Row, RowW
 
 use ohmstrain::MADE_BY;
 
-/// Names that are tried.
+/// Largest number of file names that are tried.
 const MOST_FILES: u32 = 10_000;
 
-/// A record that is being written.
+/// A recording that is being written.
 pub struct Recorder {
     rows: RowWriter<BufWriter<File>>,
     /// Path of the file.
     pub path: PathBuf,
-    /// Rows so far.
+    /// Number of rows so far.
     pub count: u64,
     has_codes: bool,
     has_reference: bool,
 }
 
 impl Recorder {
-    /// Begins the first file `PREFIX-N.csv` that does not exist yet, of what `lines` is in the middle of.
+    /// Begins the first file `PREFIX-N.csv` that does not exist yet, with the header and metadata of `lines`.
     ///
     /// # Errors
-    /// If none can be made.
+    /// If no file can be created.
     pub fn begin(prefix: &Path, lines: &LineParser) -> io::Result<Self> {
         let (path, mut file) = new_file(prefix)?;
-        // Who made what is played back did not make this.
+        // The maker of a recording that is played back did not make this one.
         let mut metadata = lines.metadata();
         metadata.other.retain(|(key, _)| key != "made_by");
         write!(file, "# made_by = {MADE_BY} live\n{metadata}")?;
@@ -49,7 +49,7 @@ impl Recorder {
         Ok(Self { rows, path, count: 0, has_codes: lines.has_codes(), has_reference: reference.is_some() })
     }
 
-    /// Writes a row, with the number of the mark that was put on it, if one was.
+    /// Writes a row, and the number of its mark, if it has one.
     ///
     /// # Errors
     /// If it cannot be written.
@@ -66,7 +66,7 @@ impl Recorder {
         self.rows.number(mark.map_or(f64::NAN, f64::from));
         self.count += 1;
         self.rows.end()?;
-        // Whatever ends the program, the file has whole rows.
+        // Flushed, so that the file has whole rows however the program ends.
         self.rows.flush()
     }
 }

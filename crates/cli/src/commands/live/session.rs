@@ -1,4 +1,4 @@
-//! State while the view runs: the filter, and the lines so far.
+//! State of the view: the filter, and the lines so far.
 
 use std::collections::VecDeque;
 use std::time::Instant;
@@ -16,15 +16,15 @@ use crate::port::{Due, Headed, Taker};
 use crate::run::{builder, builder_anew, median, of_first};
 use crate::suits::FIRST_LIVE_READINGS;
 
-/// Rows that are kept for the plot at most.
+/// Largest number of rows kept for the plot.
 const MOST_POINTS: usize = 1 << 16;
-/// A step this many times as long as steps usually are is a gap.
+/// Ratio of a step to the usual step above which it is a gap.
 const GAP: f64 = 5.0;
 /// Shortest pause that is reported, s.
 const SILENCE_S: f64 = 2.0;
-/// Share of a new step in what steps usually are.
+/// Weight of a new step in the running mean of steps.
 const NEW_STEP: f64 = 0.1;
-/// Readings of the last seconds, and how many, that tell what the rested sensor reads.
+/// Duration, s, over which the reading of the rested sensor is determined, and the smallest number of readings for that.
 const REST_S: f64 = 1.0;
 const LEAST_AT_REST: usize = 5;
 
@@ -39,7 +39,7 @@ pub struct Point {
     pub half_width: f64,
 }
 
-/// Counts of what has come.
+/// Counts of rows, gaps, bad lines and the like.
 #[derive(Clone, Copy, Default)]
 pub struct Counts {
     pub rows: u64,
@@ -70,7 +70,7 @@ pub struct Session<'a> {
     /// Times of the marks, s.
     pub marks: VecDeque<f64>,
     pub last: Option<Estimate>,
-    /// Time at which the last row was taken.
+    /// Arrival of the last row.
     taken: Option<Instant>,
     pub counts: Counts,
     pub recorder: Option<Recorder>,
@@ -79,7 +79,7 @@ pub struct Session<'a> {
 }
 
 impl<'a> Session<'a> {
-    /// Waits for a header, unless the flags have it.
+    /// Creates a session that waits for a header, unless the flags contain it.
     ///
     /// # Errors
     /// If the flags contradict each other or the sensor.
@@ -133,7 +133,7 @@ impl<'a> Session<'a> {
         &self.sensor
     }
 
-    /// A header has come: another stream begins.
+    /// Begins another stream after a header.
     fn headed(&mut self) -> Result<(), CliError> {
         let kind = self.lines.reading_kind();
         let header = self.args.port.source();
@@ -141,12 +141,12 @@ impl<'a> Session<'a> {
         if let Some(joint) = trace::joint(&self.lines.metadata()) {
             self.sensor = self.calibrated.clone().on_joint(joint)?;
         }
-        // What was said of lines above it is settled.
+        // Messages about the lines above it no longer apply.
         self.message.clear();
         if self.counts.rows > 0 { self.restart() } else { Ok(self.begin()?) }
     }
 
-    /// A fresh filter.
+    /// Starts a new filter.
     fn begin(&mut self) -> Result<(), Error> {
         let anew = self.counts.restarts > 0;
         let wanted = if anew { builder_anew } else { builder }(&self.sensor, &self.args.estimate);
@@ -158,7 +158,7 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// The clock has started again: so does everything that has times.
+    /// Restarts everything that depends on time, after the clock has restarted.
     fn restart(&mut self) -> Result<(), CliError> {
         self.counts.restarts += 1;
         self.begin()?;
@@ -184,7 +184,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Rows per second, as they usually come.
+    /// Returns the usual rate of rows per second.
     pub fn rate_hz(&self) -> Option<f64> {
         self.usual_step_s.filter(|step_s| *step_s > 0.0).map(f64::recip)
     }
@@ -195,7 +195,7 @@ impl<'a> Session<'a> {
         self.taken.map(|taken| taken.elapsed().as_secs_f64()).filter(|silent_s| *silent_s > longest_s)
     }
 
-    /// Doubts the unit of the readings, and takes R₀ of the first ones if that is wanted.
+    /// Checks the unit of the readings, and computes R₀ from the first ones if requested.
     fn doubt_early(&mut self, reading: f64) -> Result<(), CliError> {
         let wanted = match self.args.estimate.rest_resistance {
             Some(RestResistance::First(count)) => count,
@@ -219,10 +219,10 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// The sensor is at rest now: what it reads is R₀, and the strain is zero.
+    /// Takes the sensor as rested now: its reading becomes R₀, and its strain zero.
     ///
     /// # Errors
-    /// If no filter can be made any more.
+    /// If no filter can be built.
     pub fn zero(&mut self) -> Result<(), CliError> {
         let Some(last_s) = self.points.back().map(|point| point.time_s) else { return Ok(()) };
         let recent = self.points.iter().rev().take_while(|point| point.time_s >= last_s - REST_S);
@@ -239,7 +239,7 @@ impl<'a> Session<'a> {
         }
         self.rest = Some(rest);
         self.begin()?;
-        // A sensor that is always stretched somewhat cannot start at zero.
+        // A sensor whose range excludes zero cannot start there.
         let wanted = builder(&self.sensor, &self.args.estimate).rest_resistance(rest);
         let at_zero = wanted.initial_strain(0.0).build();
         let starts = if at_zero.is_ok() { "; it starts again at zero" } else { "" };
@@ -257,7 +257,7 @@ impl<'a> Session<'a> {
         self.message = format!("mark {} at {:.2} s", self.counts.marks, last.time_s);
     }
 
-    /// Begins a record, or ends it.
+    /// Starts or stops recording.
     pub fn toggle_record(&mut self) {
         self.message = match self.recorder.take() {
             Some(recorder) => {

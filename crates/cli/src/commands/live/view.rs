@@ -1,4 +1,4 @@
-//! The picture: a plot of the last seconds, and the numbers of now. Any size of terminal will do, as far as it goes.
+//! The picture: a plot of the last seconds, and the present numbers. It adapts to any size of terminal.
 
 use ohmstrain::number::{shown, significant};
 use ohmstrain::{Estimate, Quantity, ReadingUnit};
@@ -14,20 +14,20 @@ use super::session::Session;
 use crate::args::LiveArgs;
 use crate::printable::printable;
 
-/// Columns of the numbers, and the least that a plot needs beside them.
+/// Width of the numbers in columns, and the smallest width of a plot beside them.
 const NUMBERS_WIDTH: u16 = 38;
 const PLOT_WIDTH: u16 = 30;
 const PLOT_HEIGHT: u16 = 6;
-/// Rows of a terminal that is short of them.
+/// Height in rows below which a terminal counts as low.
 const LOW: u16 = 10;
-/// Points that are drawn: a few per dot of a wide terminal.
+/// Largest number of points drawn: a few per dot of a wide terminal.
 const MOST_DRAWN: usize = 2000;
 /// Width of a bar that stands for a probability.
 const BAR: usize = 10;
 
 /// Draws everything.
 pub fn draw(frame: &mut Frame, session: &Session, status: &str, args: &LiveArgs) {
-    // A small terminal has room for numbers, and for what there is to say instead of the keys.
+    // A low terminal has room for the numbers, and for messages in place of the keys.
     let is_low = frame.area().height < LOW;
     let said = if session.message.is_empty() { 0 } else { 1 };
     let (message, keys) = if is_low { (said, 1 - said) } else { (2, 1) };
@@ -90,7 +90,7 @@ fn numbers(session: &Session) -> Vec<Line<'static>> {
     let mut lines = vec![];
     let mut line =
         |name: &str, text: String| lines.push(Line::from(vec![Span::from(format!("{name:<11}")).dim(), text.into()]));
-    // What stands below is as old.
+    // The numbers below are equally old.
     if let Some(silent_s) = session.silent_s() {
         line("silent", format!("for {silent_s:.0} s"));
     }

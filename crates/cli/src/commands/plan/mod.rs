@@ -1,4 +1,4 @@
-//! Plan of a recording, and its worth, before anything has been recorded: simulated with a sensor's own law.
+//! Plans of recordings and their value, simulated with a sensor's own law before anything has been recorded.
 
 mod motion;
 mod pacing;
@@ -27,7 +27,7 @@ use motion::Protocols;
 use ohmstrain::number::{self, fixed, significant};
 use worth::{Sampling, Told, Worth};
 
-/// Version of what `--json` prints.
+/// Version of the output of `--json`.
 const SCHEMA: u32 = 1;
 
 /// Content of the output of `--json`.
@@ -36,7 +36,7 @@ struct Json<'a> {
     sensor: String,
     recordings: &'a [Told],
     sampling: &'a [Worth],
-    /// Errors at the fastest of these rates.
+    /// Error at the fastest of these rates, with drift as the only disturbance, percent.
     drift_alone_percent: f64,
     noise_alone_percent: f64,
     neither_percent: f64,
@@ -79,7 +79,7 @@ pub fn run(args: &PlanArgs, messages: &Messages) -> Result<(), CliError> {
     })
 }
 
-/// Writes a protocol for a person, and says what it asks for.
+/// Writes a protocol for a person, and prints what it requires.
 fn protocol(args: &PlanArgs, path: &Path) -> Result<(), CliError> {
     let (quantity, positions) = match (&args.strains, &args.angles) {
         (Some(strains), _) => (ReferenceQuantity::Strain, strains),
@@ -108,7 +108,7 @@ fn protocol(args: &PlanArgs, path: &Path) -> Result<(), CliError> {
     })
 }
 
-/// A sensor calibrated on a simulated bench session, in which the law is as wrong as it is of real sensors.
+/// Returns a sensor calibrated on a simulated bench session, whose law is as wrong as for real sensors.
 fn illustrative(args: &PlanArgs, messages: &Messages) -> Result<Sensor, CliError> {
     let settings = SimulationSettings {
         speed_mm_s: 5.0,
@@ -149,7 +149,7 @@ fn text(sensor: &Sensor, name: &str, protocols: &Protocols, told: &[Told], worth
         ]);
     }
     let estimator = params.filter_of(params.default_estimator).name();
-    // Names of parameters are not broken, those of recordings are.
+    // Names of parameters are not wrapped, those of recordings are.
     if let Some(left_open) = recordings.column_mut(5) {
         left_open.set_constraint(ColumnConstraint::ContentWidth);
     }
@@ -190,7 +190,7 @@ fn text(sensor: &Sensor, name: &str, protocols: &Protocols, told: &[Told], worth
     text
 }
 
-/// Describes the errors that no way of sampling reduces.
+/// Describes the errors that no sampling scheme reduces.
 fn floor(worth: &Sampling) -> String {
     let Sampling { drift_alone_percent, noise_alone_percent, neither_percent, .. } = worth;
     let shown = |percent: &f64| fixed(*percent, 1);

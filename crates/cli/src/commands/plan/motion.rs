@@ -1,35 +1,35 @@
-//! Recordings that could be made: strain over time.
+//! Candidate recordings: strain over time.
 
 use ohmstrain::SensorParams;
 use ohmstrain::number::significant;
 
 /// Readings per second of these recordings.
 pub const RATE_HZ: f64 = 20.0;
-/// Speeds as shares of the fastest.
+/// Speeds as fractions of the fastest.
 const SPEEDS: [f64; 3] = [1.0, 0.4, 0.15];
-/// A hold is this many times as long as the slowest relaxation, and within these bounds, s.
+/// Duration of a hold in multiples of the slowest relaxation, and its bounds, s.
 const HOLD: f64 = 3.0;
 const HOLD_S: (f64, f64) = (10.0, 300.0);
-/// A hold without waiting for what is slow.
+/// Duration of a hold that does not wait for slow relaxation, s.
 const SHORT_HOLD_S: f64 = 5.0;
-/// Levels of holds, as shares of the range.
+/// Levels of holds, as fractions of the range.
 const LEVELS: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
-/// Movements to and fro at each speed.
+/// Number of movements to and fro at each speed.
 const CYCLES: usize = 6;
 
-/// A recording that could be made.
+/// A candidate recording.
 pub struct Protocol {
     pub name: String,
     pub strain: Vec<f64>,
 }
 
-/// Common elements of the protocols.
+/// Common properties of the protocols.
 pub struct Protocols {
     low: f64,
     high: f64,
     /// Speeds, per second, fastest first.
     pub speeds: Vec<f64>,
-    /// The slowest relaxation, s.
+    /// Slowest relaxation time, s.
     pub slowest_s: f64,
 }
 
@@ -38,13 +38,13 @@ impl Protocols {
     pub fn new(params: &SensorParams) -> Self {
         let range = params.law.range;
         let slowest_s = params.law.branches.iter().map(|branch| branch.tau_s).fold(1.0, f64::max);
-        // A tenth of a second for the whole range is more than any stage does.
+        // Covering the whole range in a tenth of a second is faster than any test stage.
         let fastest = params.validity.fastest_rate_per_s.min(10.0 * range.span());
         let speeds = SPEEDS.map(|share| share * fastest).to_vec();
         Self { low: range.lower, high: range.upper, speeds, slowest_s }
     }
 
-    /// The recordings, from the poorest to the best.
+    /// Returns the recordings, the least informative first.
     pub fn all(&self) -> Vec<Protocol> {
         let hold_s = (HOLD * self.slowest_s).clamp(HOLD_S.0, HOLD_S.1);
         let one = Protocol { name: "to and fro, one speed".into(), strain: self.cycles(&self.speeds[..1], 3 * CYCLES) };
@@ -66,7 +66,7 @@ impl Protocols {
         path.hold(5.0);
         for speed in speeds {
             for cycle in 0..count {
-                // Every second one goes half-way only, so that the past differs at one strain.
+                // Every second movement goes half-way only, so that the same strain has different histories.
                 let top = if cycle % 2 == 0 { self.high } else { self.low + 0.5 * (self.high - self.low) };
                 path.go(top, *speed);
                 path.go(self.low, *speed);
@@ -112,7 +112,7 @@ impl Path {
     }
 }
 
-/// The strain at another rate, straight between the rows.
+/// Interpolates the strain linearly at another rate.
 pub fn at_rate(strain: &[f64], rate_hz: f64) -> Vec<f64> {
     let end_s = (strain.len() - 1) as f64 / RATE_HZ;
     let at = |row: usize| {

@@ -1,21 +1,21 @@
-//! A protocol for a person: every position from below and from above, at several paces, with long and short holds.
+//! A protocol for a person: each position from below and from above, at several paces, with long and short holds.
 
 use ohmstrain_bench_data::pacing::{PacedStep, Pacing};
 
-/// Rest at the beginning and at the end, and one long hold, s.
+/// Duration of the rest at the beginning and at the end, and of one long hold, s.
 const REST_S: f64 = 20.0;
 const LONG_S: f64 = 30.0;
-/// Durations of moves and of holds, in turn, s.
+/// Durations of moves and of holds, used in turn, s.
 const MOVES_S: [f64; 4] = [2.0, 1.0, 3.0, 0.7];
 const HOLDS_S: [f64; 3] = [4.0, 8.0, 3.0];
 
-/// Steps for the positions of `pacing`, of which the first is the rest, for as long as `minutes` have room.
+/// Returns steps through the positions of `pacing`, the first of which is the rest, that fill `minutes`.
 pub fn steps(pacing: &Pacing, minutes: f64) -> Vec<PacedStep> {
     let last = pacing.positions.len() - 1;
     let mut steps = vec![PacedStep { to: 0, move_s: 0.0, hold_s: REST_S }];
     let (mut moves, mut holds) = (MOVES_S.iter().cycle(), HOLDS_S.iter().cycle());
     let mut elapsed_s = 2.0 * REST_S;
-    // Up and down in one move, then from position to position: the past differs at each of them.
+    // Up and down in one move each, then from position to position: each position is reached with different histories.
     let round = [last, 0].into_iter().chain(1..=last).chain((0..last).rev());
     for (k, to) in round.cycle().enumerate() {
         let is_there = steps.last().is_some_and(|step| step.to == to);

@@ -1,4 +1,4 @@
-//! Information of recordings about a law's parameters, and errors of an estimate by sampling and converters.
+//! Information of recordings about a law's parameters, and errors of an estimate for several sampling rates and converters.
 
 use nalgebra::DMatrix;
 use ohmstrain::{JointParams, Reading, ReadingUnit, Sensor};
@@ -14,24 +14,25 @@ use super::motion::{Protocol, Protocols, RATE_HZ, at_rate};
 use crate::error::CliError;
 use ohmstrain_report::Law;
 
-/// Readings per second that are tried.
+/// Sampling rates that are compared, Hz.
 pub const RATES_HZ: [f64; 4] = [2.0, 5.0, 20.0, FASTEST_HZ];
 /// The last of them.
 pub const FASTEST_HZ: f64 = 50.0;
 const FINEST_HZ: f64 = 100.0;
-/// Bits of a converter; 0 for readings as good as the sensor.
+/// Resolutions of converters, bits; 0 stands for readings as good as the sensor.
 pub const BITS: [u32; 4] = [0, 12, 10, 8];
-/// Draws of noise and drift; the median of their errors is stated. One that leads the filter astray is no measure of sampling.
+/// Number of draws of noise and drift. The median error is reported, since a draw that makes the filter diverge says nothing
+/// about sampling.
 const DRAWS: u64 = 5;
-/// Largest standard error of a parameter that counts as determined, as a share of it.
+/// Largest standard error of a determined parameter, as a share of its value.
 const TOLD: f64 = 0.25;
-/// An error is hardly larger than another one up to this factor.
+/// Factor up to which an error is hardly larger than another.
 const HARDLY: f64 = 1.1;
-/// Least reading, as a share of R₀: the drift stands for the law's errors too, and can be larger than a resistance.
+/// Smallest reading, as a share of R₀: the drift also represents errors of the law, and can exceed the resistance.
 const LEAST_READING: f64 = 0.01;
-/// Relative step of a difference: errors of its square and of rounding over it are both about 1e-9.
+/// Relative step of the central difference: its truncation error (the square) and its rounding error are both below 1e-9.
 const STEP: f64 = 1e-5;
-/// Seconds in which a filter finds its feet, which are not scored.
+/// Time in which a filter settles and is not scored, s.
 const SETTLING_S: f64 = 5.0;
 
 /// Information of a recording.
@@ -41,21 +42,21 @@ pub struct Told {
     pub minutes: f64,
     /// Parameters of the law.
     pub parameters: usize,
-    /// Number of parameters with a standard error of less than a quarter of them.
+    /// Number of parameters with a standard error below a quarter of their value.
     pub told: usize,
     /// Largest standard error of the determined parameters, percent.
     pub worst_percent: Option<f64>,
     /// Condition number of the Fisher information, its diagonal scaled to one.
     pub condition: f64,
-    /// Parameter with the least information, if any is undetermined.
+    /// Parameter with the least information, if any parameter is undetermined.
     pub left_open: String,
 }
 
-/// Errors with one way of sampling.
+/// Errors of one sampling scheme.
 #[derive(Serialize)]
 pub struct Worth {
     pub rate_hz: f64,
-    /// Bits of the converter; none if it is as good as the sensor.
+    /// Bits of the converter; `None` if it is as good as the sensor.
     pub bits: Option<u32>,
     /// Root mean square error in percent of the sensor's range, the median of several draws of noise and drift.
     pub error_percent: f64,
@@ -64,46 +65,46 @@ pub struct Worth {
     pub angle_deg: Option<f64>,
 }
 
-/// Errors with several ways of sampling, and those that none of them reduces.
+/// Errors of several sampling schemes, and those that no scheme reduces.
 #[derive(Serialize)]
 pub struct Sampling {
     pub cases: Vec<Worth>,
-    /// Error at [`FASTEST_HZ`] of readings that drift and have no noise otherwise, percent of the sensor's range.
+    /// Error at [`FASTEST_HZ`] with drift as the only disturbance, percent of the sensor's range.
     pub drift_alone_percent: f64,
-    /// Error of readings that have noise and do not drift.
+    /// The same with white noise as the only disturbance.
     pub noise_alone_percent: f64,
-    /// Error of readings that have neither.
+    /// The same with neither.
     pub neither_percent: f64,
 }
 
 impl Sampling {
-    /// The slowest and coarsest of the cases whose error is hardly larger than the least.
+    /// Returns the slowest and coarsest case whose error is hardly larger than the smallest.
     pub fn enough(&self) -> Option<&Worth> {
         let least = self.cases.iter().map(|one| one.error_percent).reduce(f64::min)?;
-        // From the slowest on, and for each rate from the finest converter on.
+        // Sorted from the slowest rate on, and for each rate from the finest converter on.
         let close = |one: &&Worth| one.error_percent < HARDLY * least;
         let slowest = self.cases.iter().find(close)?;
         self.cases.iter().filter(close).rfind(|one| one.rate_hz == slowest.rate_hz)
     }
 }
 
-/// The shortest recording that tells as many parameters as any.
+/// Returns the shortest recording that determines the largest number of parameters.
 pub fn best(recordings: &[Told]) -> Option<&Told> {
     let most = recordings.iter().map(|one| one.told).max()?;
     recordings.iter().filter(|one| one.told == most).min_by(|a, b| a.minutes.total_cmp(&b.minutes))
 }
 
-/// Factors on each kind of noise, relative to the calibration.
+/// Factors on each kind of noise, relative to the calibrated noise.
 #[derive(Clone, Copy)]
 struct Disturbed {
     drift: f64,
     white: f64,
 }
 
-/// Noise of the calibration.
+/// The calibrated noise.
 const AS_FOUND: Disturbed = Disturbed { drift: 1.0, white: 1.0 };
 
-/// The sensor's drift, the same one however it is sampled: shares of R₀, [`FINEST_HZ`] of them a second.
+/// Draws the sensor's drift relative to R₀, at [`FINEST_HZ`], the same for every sampling scheme.
 fn drift(noise: NoiseParams, rows: usize, seed: u64) -> Vec<f64> {
     let mut random = ChaCha8Rng::seed_from_u64(2 * seed);
     let mut draw = || -> f64 { StandardNormal.sample(&mut random) };
@@ -116,7 +117,7 @@ fn drift(noise: NoiseParams, rows: usize, seed: u64) -> Vec<f64> {
     (0..rows).map(next).collect()
 }
 
-/// Readings of a motion by the sensor's law, with white noise and a drifting baseline.
+/// Simulates the readings of a motion by the sensor's law, with white noise and a drifting baseline.
 fn readings(sensor: &Sensor, (rate_hz, strain): (f64, &[f64]), disturbed: Disturbed, seed: u64) -> Vec<f64> {
     let params = sensor.params();
     let law = Law::new(params, params.rest_reading);
@@ -144,7 +145,7 @@ pub fn told(sensor: &Sensor, protocol: &Protocol) -> Told {
     let minutes = protocol.strain.len() as f64 / RATE_HZ / 60.0;
     let (names, values) = parameters(&sensor.params().law);
     let information = information(sensor, &protocol.strain);
-    // With ones on its diagonal, so that units do not count.
+    // Scaled to ones on its diagonal, so that units do not matter.
     let scale: Vec<f64> = information.diagonal().iter().map(|x| x.sqrt().max(f64::MIN_POSITIVE)).collect();
     let scaled = DMatrix::from_fn(values.len(), values.len(), |i, j| information[(i, j)] / (scale[i] * scale[j]));
     let eigen = scaled.symmetric_eigen();
@@ -169,14 +170,15 @@ pub fn told(sensor: &Sensor, protocol: &Protocol) -> Told {
     }
 }
 
-/// The parameters of a law that are not zero, by name.
+/// Returns names and values of a law's non-zero parameters.
 fn parameters(law: &LawParams) -> (Vec<String>, Vec<f64>) {
     let mut law = law.clone();
     law.parameters_mut().into_iter().map(|own| (own.name, *own.value)).filter(|(_, value)| *value != 0.0).unzip()
 }
 
-/// JᵀJ of the whitened readings by central differences. The drift is an Ornstein-Uhlenbeck process: a reading less what is left of
-/// the one before has white errors of the variance that both noises leave, but for the neighbours' share of the white one.
+/// Returns JᵀJ of the whitened readings, by central differences. The drift is an Ornstein-Uhlenbeck process, so each reading
+/// minus the decayed previous one has nearly white errors; the correlation that white noise adds between neighbours is
+/// neglected.
 fn information(sensor: &Sensor, strain: &[f64]) -> DMatrix<f64> {
     let params = sensor.params();
     let time_s = times(strain.len(), RATE_HZ);
@@ -223,7 +225,7 @@ pub fn sampling(sensor: &Sensor, protocols: &Protocols) -> Result<Sampling, CliE
     Ok(Sampling { cases, drift_alone_percent, noise_alone_percent, neither_percent })
 }
 
-/// The draw with the median error, with the coverage of all.
+/// Returns the draw with the median error, and the mean coverage of all draws.
 fn median_of_draws(
     sensor: &Sensor,
     (rate_hz, bits): (f64, u32),
@@ -241,7 +243,7 @@ fn median_of_draws(
     Ok(Worth { coverage_percent, ..median })
 }
 
-/// Readings through a divider whose resistor is the geometric mean of their range.
+/// Converts readings through a divider whose resistor is the geometric mean of their range.
 fn converted(exact: &[f64], bits: u32) -> Result<Vec<Reading>, CliError> {
     if bits == 0 {
         return Ok(exact.iter().map(|value| Reading::from(*value)).collect());
@@ -263,7 +265,7 @@ fn scored(
     strain: &[f64],
     readings: &[Reading],
 ) -> Result<Worth, CliError> {
-    // What a correction has learned is the error of the law on real readings; these have none.
+    // A correction models the law's error on real readings, which simulated readings do not have.
     let mut filter = sensor.filter().without_correction().build()?;
     let (mut squares, mut inside, mut count) = (0.0, 0_usize, 0_usize);
     for ((time_s, truth), reading) in times(strain.len(), rate_hz).into_iter().zip(strain).zip(readings) {

@@ -1,4 +1,4 @@
-//! Columns of a stream that is recorded, and those that a protocol adds.
+//! Columns of a recorded stream, and those that a protocol adds.
 
 use ohmstrain_bench_data::pacing::{Pacing, Position};
 use ohmstrain_bench_data::{Line, LineParser, Metadata, ReferenceQuantity};
@@ -6,29 +6,29 @@ use ohmstrain_bench_data::{Line, LineParser, Metadata, ReferenceQuantity};
 use crate::channels::{self, ONE_CHANNEL};
 use crate::port::Due;
 
-/// Columns that are none of a reading, and are kept under their names.
+/// Columns that contain no readings and are kept under their names.
 const KEPT: [&str; 2] = ["time_us", "temperature_c"];
 
 /// Lines of a stream: a parser for each column of readings.
 pub struct Columns {
     names: Vec<String>,
     channels: Vec<LineParser>,
-    /// The header as each channel's parser takes it.
+    /// The header in the form that each channel's parser takes.
     masked: Vec<String>,
-    /// Places of the cells that are written beside the time.
+    /// Indices of the cells that are written after the time.
     written: Vec<usize>,
 }
 
 /// A row of a stream.
 pub struct StreamRow {
-    /// Cells as they are written, after the time.
+    /// Cells to be written after the time.
     pub cells: String,
     /// The first channel's reading; NaN if it is missing.
     pub reading: f64,
 }
 
 impl Columns {
-    /// Columns of a header; `None` if it is none. `remarks` are the lines with `#` above it.
+    /// Parses a header; `None` if the line is not one. `remarks` are the lines with `#` above it.
     ///
     /// # Errors
     /// If a joint of the protocol has no column of readings, or a unit is missing.
@@ -69,7 +69,7 @@ impl Columns {
             let masked = names.iter().enumerate().map(masked).collect::<Vec<_>>().join(",");
             let mut lines = LineParser::new(name, overrides.clone());
             for remark in remarks {
-                // A remark that is none is passed over as it is in a stream.
+                // A remark without metadata is ignored, as in any stream.
                 let _ = lines.take(remark.as_bytes());
             }
             lines.take(masked.as_bytes()).map_err(|fault| fault.to_string())?;
@@ -82,17 +82,17 @@ impl Columns {
         Ok(Some(Self { names, channels, masked: headers, written }))
     }
 
-    /// True if a line is the header again, as a device sends it that has started anew.
+    /// True if a line repeats the header, as a device sends it after a restart.
     pub fn is_header(&self, line: &str) -> bool {
         line.split(',').map(str::trim).eq(self.names.iter().map(String::as_str))
     }
 
-    /// Number of columns of readings.
+    /// Returns the number of columns of readings.
     pub const fn channels(&self) -> usize {
         self.channels.len()
     }
 
-    /// The header of the recording.
+    /// Returns the header of the recording.
     pub fn header(&self, pacing: &Pacing) -> String {
         let names = self.written.iter().map(|k| self.names[*k].clone());
         std::iter::once("time_s".to_owned()).chain(names).chain(known_names(pacing)).collect::<Vec<_>>().join(",")
@@ -100,13 +100,13 @@ impl Columns {
 
     /// Returns the stream's metadata with the overrides.
     pub fn metadata(&self) -> Metadata {
-        // Who made what is played back did not make this.
+        // The maker of a recording that is played back did not make this one.
         let mut metadata = self.channels.first().map_or_else(Metadata::default, LineParser::metadata);
         metadata.other.retain(|(key, _)| key != "made_by");
         metadata
     }
 
-    /// The row of a line.
+    /// Parses a line into a row.
     ///
     /// # Errors
     /// The first channel's fault.
@@ -130,7 +130,7 @@ impl Columns {
         Ok(Some(Due { row: row_of, time_s: row.time_s, restarted }))
     }
 
-    /// The device has started anew: any time may come.
+    /// Accepts any time for the next row, after the device has restarted.
     pub fn restart(&mut self) {
         for (lines, header) in self.channels.iter_mut().zip(&self.masked) {
             let _ = lines.take(header.as_bytes());
@@ -138,7 +138,7 @@ impl Columns {
     }
 }
 
-/// Names of the columns that a protocol adds.
+/// Returns the names of the columns that a protocol adds.
 fn known_names(pacing: &Pacing) -> Vec<String> {
     let [value, sd] = match pacing.quantity {
         ReferenceQuantity::Strain => ["strain", "strain_sd"],
@@ -150,7 +150,7 @@ fn known_names(pacing: &Pacing) -> Vec<String> {
     }
 }
 
-/// Cells of the columns that a protocol adds: empty where nothing is known.
+/// Returns the cells of the columns that a protocol adds; empty if the strain is unknown.
 pub fn known_cells(pacing: &Pacing, held: Option<usize>) -> String {
     let cells = |position: &Position| {
         let pairs = position.values.iter().map(|value| format!("{value},{}", position.sd));

@@ -1,7 +1,7 @@
 //! Recording of a person who follows a protocol: the strain is known where the body is held.
 //!
-//! The protocol runs on the clock of the readings: it waits while none come, and a recording that is played back is followed at any
-//! speed. On a terminal the steps are drawn, elsewhere they are lines.
+//! The protocol runs on the clock of the readings: it waits while none arrive, and a recording can be played back at any speed.
+//! On a terminal the steps are drawn; elsewhere they are printed as lines.
 
 mod columns;
 mod pacer;
@@ -25,7 +25,7 @@ use columns::StreamRow;
 use pacer::Pacer;
 use recording::Recording;
 
-/// Time for which a key, or a line, is waited for.
+/// Longest wait for a key, or a line.
 const KEY_WAIT: Duration = Duration::from_millis(10);
 const LINE_WAIT: Duration = Duration::from_millis(100);
 /// Time between two drawings.
@@ -54,7 +54,7 @@ pub fn run(args: &RecordArgs, messages: &Messages) -> Result<(), CliError> {
     close(&recording, args, messages)
 }
 
-/// Ends a recording: says what it is, and what to do with it.
+/// Closes a recording, and prints a summary and the next command.
 fn close(recording: &Recording, args: &RecordArgs, messages: &Messages) -> Result<(), CliError> {
     let path = args.output.display();
     messages.remark(&recording.counts.text(recording));
@@ -86,7 +86,7 @@ fn follow(feed: &mut Feed<StreamRow>, recording: &mut Recording) -> Result<(), C
             let _ = writeln!(out, "             {status}");
         }
         for (time_s, text) in recording.cues.drain(..) {
-            // A recording goes on without a reader.
+            // Recording continues even if nobody reads this output.
             let _ = writeln!(out, "{time_s:9.1} s  {text}");
         }
         let _ = out.flush();
@@ -97,7 +97,7 @@ fn follow(feed: &mut Feed<StreamRow>, recording: &mut Recording) -> Result<(), C
     }
 }
 
-/// Draws the protocol beside the readings, and heeds keys.
+/// Draws the protocol beside the readings, and handles keys.
 fn show(
     feed: &mut Feed<StreamRow>,
     terminal: &mut DefaultTerminal,

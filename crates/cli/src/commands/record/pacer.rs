@@ -1,10 +1,10 @@
-//! Place of a person in a protocol.
+//! Progress of a person through a protocol.
 
 use std::collections::VecDeque;
 
 use ohmstrain_bench_data::pacing::{PacedStep, Pacing};
 
-/// A move back to where a spoiled step began lasts this long at least, s, and the hold there.
+/// Shortest duration of the move back to the start of a spoiled step, s, and duration of the hold there.
 const BACK_S: f64 = 1.0;
 const BACK_HOLD_S: f64 = 3.0;
 
@@ -13,7 +13,7 @@ pub struct Pacer {
     pacing: Pacing,
     ahead: VecDeque<PacedStep>,
     current: Option<Current>,
-    /// Position that the body is at, or has left last.
+    /// Position of the body, or the one that it left last.
     place: Option<usize>,
     is_paused: bool,
     /// Position that a person has marked by hand.
@@ -28,19 +28,19 @@ struct Current {
     begun_s: f64,
 }
 
-/// Instruction for now.
+/// Instruction for the present.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Instruction {
     /// Action in words.
     pub text: String,
-    /// Share of it that is over, 0 to 1.
+    /// Elapsed share of the action, 0 to 1.
     pub share: f64,
-    /// Time that is left, s.
+    /// Remaining time, s.
     pub left_s: f64,
 }
 
 impl Pacer {
-    /// A protocol that has not begun.
+    /// Creates a pacer at the start of a protocol.
     pub fn new(pacing: Pacing) -> Self {
         let ahead = pacing.steps.iter().copied().collect();
         Self { pacing, ahead, current: None, place: None, is_paused: false, by_hand: None }
@@ -56,17 +56,17 @@ impl Pacer {
         !self.pacing.steps.is_empty() && self.ahead.is_empty() && self.current.is_none() && !self.is_paused
     }
 
-    /// True if a step is being made, which can be spoiled.
+    /// True if a step is under way, which can be spoiled.
     pub const fn is_in_step(&self) -> bool {
         self.current.is_some() && !self.is_paused
     }
 
-    /// Number of steps that are still to be made.
+    /// Returns the number of steps still to be made.
     pub fn left(&self) -> usize {
         self.ahead.len() + usize::from(self.current.is_some())
     }
 
-    /// Moves on to a time; true if a step has begun or ended.
+    /// Advances to a time; returns true if a step has begun or ended.
     pub fn advance(&mut self, time_s: f64) -> bool {
         let mut has_changed = false;
         while !self.is_paused {
@@ -86,7 +86,7 @@ impl Pacer {
         has_changed
     }
 
-    /// Position in which the body is held for certain at a time.
+    /// Returns the position in which the body is certainly held at a time.
     pub fn held(&self, time_s: f64) -> Option<usize> {
         let paced = || {
             let current = self.current.as_ref()?;
@@ -96,7 +96,7 @@ impl Pacer {
         self.by_hand.or_else(paced)
     }
 
-    /// The step is spoiled: the body goes back to where it began, and makes it again. False if there is no step.
+    /// Repeats a spoiled step: the body goes back to the step's start, and makes it again. Returns false if there is no step.
     pub fn repeat(&mut self, time_s: f64) -> bool {
         let Some(spoiled) = self.current.take() else { return false };
         self.ahead.push_front(spoiled.step);
@@ -107,7 +107,7 @@ impl Pacer {
         true
     }
 
-    /// Pauses, which spoils the step, or goes on. True if a step was spoiled.
+    /// Pauses, which spoils the step, or resumes. Returns true if a step was spoiled.
     pub fn toggle_pause(&mut self, time_s: f64) -> bool {
         let spoiled = !self.is_paused && self.repeat(time_s);
         self.is_paused = !self.is_paused;
@@ -118,7 +118,8 @@ impl Pacer {
         spoiled
     }
 
-    /// A person says that the body is held at a position from now on; the same position again ends that. True if a step was spoiled.
+    /// Marks that the body is held at a position from now on; the same position again ends the mark. Returns true if a step was
+    /// spoiled.
     pub fn mark(&mut self, position: usize, time_s: f64) -> bool {
         if position >= self.pacing.positions.len() {
             return false;
@@ -138,7 +139,7 @@ impl Pacer {
         self.by_hand = None;
     }
 
-    /// Instruction for a time.
+    /// Returns the instruction for a time.
     pub fn instruction(&self, time_s: f64) -> Instruction {
         let plain = |text: String| Instruction { text, share: 0.0, left_s: 0.0 };
         let name = |position: usize| self.pacing.positions[position].name.as_str();
@@ -166,14 +167,14 @@ impl Pacer {
         Instruction { text, share, left_s: (until_s - gone_s).max(0.0) }
     }
 
-    /// The step after this one in words.
+    /// Describes the step after this one.
     pub fn next(&self) -> Option<String> {
         let step = self.ahead.front()?;
         let name = &self.pacing.positions[step.to].name;
         Some(format!("{name} in {} s", ohmstrain::number::significant(step.move_s, 2)))
     }
 
-    /// Value of the first joint by plan at a time from now on; `None` after the last step.
+    /// Returns the planned value of the first joint at a time not before now; `None` after the last step.
     pub fn planned(&self, time_s: f64) -> Option<f64> {
         let value = |position: usize| self.pacing.positions[position].values[0];
         let mut current = self.current?;

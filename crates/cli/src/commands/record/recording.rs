@@ -13,12 +13,12 @@ use crate::args::RecordArgs;
 use crate::error::CliError;
 use crate::port::{Due, Headed, Taker};
 
-/// Readings and planned values that are kept for the plots at most.
+/// Largest number of readings and planned values kept for the plots.
 const MOST_POINTS: usize = 1 << 14;
-/// A pause of the readings that spoils a step, s, or in steps as they usually are.
+/// Shortest pause of the readings that spoils a step, s, or in usual steps.
 const GAP_S: f64 = 1.0;
 const GAP_STEPS: f64 = 5.0;
-/// Time between the last row before a restart and the first after it at least, s.
+/// Shortest time between the last row before a restart and the first after it, s.
 const LEAST_STEP_S: f64 = 1e-4;
 
 /// A row of the plots.
@@ -27,18 +27,18 @@ pub struct Point {
     pub time_s: f64,
     /// The first channel's reading; NaN if it is missing.
     pub reading: f64,
-    /// Value by plan; NaN where there is none.
+    /// Planned value; NaN if there is none.
     pub planned: f64,
 }
 
-/// Counts of what was recorded.
+/// Counts of rows, holds and the like.
 #[derive(Clone, Debug, Default)]
 pub struct Counts {
     pub rows: u64,
     pub bad_lines: u64,
     pub restarts: u64,
     pub repeated: u32,
-    /// Holds of each position.
+    /// Number of holds at each position.
     pub holds: Vec<u32>,
 }
 
@@ -52,26 +52,26 @@ pub struct Recording<'a> {
     columns: Option<Columns>,
     writer: Writer,
     pub pacer: Pacer,
-    /// Time that is added to the device's times since its clock has started again, s.
+    /// Time that is added to the device's times after its clock has restarted, s.
     offset_s: f64,
-    /// The last row's time, s, and when it came.
+    /// The last row's time, s, and its arrival.
     last: Option<(f64, Instant)>,
     usual_step_s: Option<f64>,
-    /// Position that the last row was held at.
+    /// Position held in the last row.
     held: Option<usize>,
     pub counts: Counts,
     pub points: VecDeque<Point>,
     /// Last message.
     pub message: String,
-    /// Steps that have begun and that nobody has been told of, with their times, s.
+    /// Steps that have begun and have not been announced yet, with their times, s.
     pub cues: Vec<(f64, String)>,
 }
 
 impl<'a> Recording<'a> {
-    /// Begins to wait for a header.
+    /// Creates a recording that waits for a header.
     ///
     /// # Errors
-    /// If the header of the flags is none, or the file cannot be made.
+    /// If the header in the flags is invalid, or the file cannot be created.
     pub fn new(args: &'a RecordArgs, pacer: Pacer) -> Result<Self, CliError> {
         let headed = Headed::new(args.port.header.as_deref());
         let counts = Counts { holds: vec![0; pacer.pacing().positions.len()], ..Counts::default() };
@@ -101,7 +101,7 @@ impl<'a> Recording<'a> {
         Ok(recording)
     }
 
-    /// The last row's time by now, s.
+    /// Returns the present on the clock of the rows, s.
     pub fn now_s(&self) -> f64 {
         let speed =
             if self.args.port.port.as_ref().is_some_and(|port| port.is_file()) { self.args.port.speed } else { 1.0 };
@@ -116,7 +116,7 @@ impl<'a> Recording<'a> {
         self.columns.as_ref().is_some_and(|columns| columns.channels() > 1)
     }
 
-    /// Begins with a header; false if it is none.
+    /// Begins with a header; returns false if the line is not one.
     fn begin(&mut self, header: &str) -> Result<bool, CliError> {
         let stream = (self.name.as_str(), &self.overrides, &self.remarks[..]);
         let found = Columns::of(header, stream, self.pacer.pacing());
@@ -129,24 +129,24 @@ impl<'a> Recording<'a> {
         Ok(true)
     }
 
-    /// The step is spoiled, for a reason.
+    /// Repeats the spoiled step, for a reason.
     pub fn repeat(&mut self, why: &str) -> Result<(), CliError> {
         let now_s = self.now_s();
         if self.pacer.repeat(now_s) { self.spoiled(why) } else { Ok(()) }
     }
 
-    /// Pauses the protocol, or goes on.
+    /// Pauses or resumes the protocol.
     pub fn toggle_pause(&mut self) -> Result<(), CliError> {
         let now_s = self.now_s();
         if self.pacer.toggle_pause(now_s) {
             self.spoiled("paused")?;
         }
-        // What was marked by hand meanwhile stays.
+        // Marks made by hand during the pause stay.
         self.writer.settle();
         Ok(())
     }
 
-    /// Marks a position by hand, or ends that.
+    /// Marks a position by hand, or ends the mark.
     pub fn mark(&mut self, position: usize) -> Result<(), CliError> {
         let now_s = self.now_s();
         if self.pacer.mark(position, now_s) {
@@ -166,13 +166,13 @@ impl<'a> Recording<'a> {
         Ok(())
     }
 
-    /// Notes the instruction of now for those who see no terminal.
+    /// Records the present instruction for users without a terminal.
     fn cue(&mut self, time_s: f64) {
         let text = self.pacer.instruction(time_s).text;
         self.cues.push((time_s, text));
     }
 
-    /// Notes how long a step usually is, and whether this one was a gap.
+    /// Updates the usual step; returns true if this step was a gap.
     fn is_gap(&mut self, time_s: f64) -> bool {
         let Some((last_s, _)) = self.last else { return false };
         let step_s = time_s - last_s;
@@ -184,7 +184,7 @@ impl<'a> Recording<'a> {
         is_gap
     }
 
-    /// Notes that the body is held, or is not any more.
+    /// Records that the body is held, or no longer held.
     fn see(&mut self, held: Option<usize>) {
         if let (Some(position), true) = (held, held != self.held) {
             self.counts.holds[position] += 1;
@@ -275,7 +275,7 @@ impl Taker for Recording<'_> {
 }
 
 impl Counts {
-    /// Returns them as a sentence.
+    /// Returns the counts as a sentence.
     pub fn text(&self, recording: &Recording) -> String {
         let positions = &recording.pacer.pacing().positions;
         let held = positions.iter().zip(&self.holds).filter(|(_, count)| **count > 0);

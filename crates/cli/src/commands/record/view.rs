@@ -1,4 +1,4 @@
-//! The picture: what to do, the plan with the present in it, and the readings.
+//! The picture: the instruction, the plan around the present, and the readings.
 
 use ohmstrain::Quantity;
 use ohmstrain::number::shown;
@@ -14,12 +14,12 @@ use super::recording::{Point, Recording};
 use crate::args::RecordArgs;
 use crate::printable::printable;
 
-/// Plan that is shown ahead, s, and how many of its points are drawn.
+/// Length of the plan ahead that is shown, s, and its number of points.
 const AHEAD_S: f64 = 20.0;
 const AHEAD_POINTS: usize = 200;
-/// Points of the past that are drawn.
+/// Largest number of past points drawn.
 const MOST_DRAWN: usize = 1000;
-/// Rows that plots need.
+/// Height of a plot in rows.
 const PLOT_HEIGHT: u16 = 6;
 /// Beats of the metronome, per second.
 const BEATS_HZ: f64 = 1.0;
@@ -39,7 +39,7 @@ pub fn draw(frame: &mut Frame, recording: &Recording, status: &str, args: &Recor
     frame.render_widget(Paragraph::new(printable(&heading)).bold(), title);
     let now_s = recording.now_s();
     let instruction = recording.pacer.instruction(now_s);
-    // A beat a second: a mark that comes and goes.
+    // A beat per second: a mark that appears and disappears.
     let beat = if ((now_s * 2.0 * BEATS_HZ) as u64).is_multiple_of(2) { "●" } else { "○" };
     let left = if instruction.left_s > 0.0 { format!("  {:.0}", instruction.left_s.ceil()) } else { String::new() };
     let gauge = Gauge::default()
@@ -122,7 +122,7 @@ fn draw_readings(frame: &mut Frame, recording: &Recording, window_s: f64, area: 
     frame.render_widget(chart(vec![line(&readings, Color::Green)], " readings; time, s ", x, y), area);
 }
 
-/// Some of the points that were recorded: enough for a wide terminal.
+/// Returns a selection of the recorded points, enough for a wide terminal.
 fn drawn(recording: &Recording, value: impl Fn(&Point) -> f64) -> Vec<(f64, f64)> {
     let every = recording.points.len().div_ceil(MOST_DRAWN).max(1);
     recording.points.iter().step_by(every).map(|point| (point.time_s, value(point))).collect()

@@ -4,21 +4,21 @@ use std::path::{Path, PathBuf};
 
 use crate::error::CliError;
 
-/// A recording that is being written: whole rows at any time. The rows of the step that is being made can still lose their strain.
+/// A recording that is being written, with whole rows at any time. Rows of the present step can still lose their strain.
 pub struct Writer {
     file: File,
     path: PathBuf,
-    /// Rows since the step began, without the protocol's cells, and where they begin in the file.
+    /// Rows since the step began, without the protocol's cells, and their offset in the file.
     pending: Vec<String>,
     begun: u64,
     end: u64,
 }
 
 impl Writer {
-    /// Makes the file.
+    /// Creates the file.
     ///
     /// # Errors
-    /// If it is there already, and is not to be replaced, or cannot be made.
+    /// If it exists and is not to be replaced, or cannot be created.
     pub fn new(path: &Path, force: bool) -> Result<Self, CliError> {
         let file = if force {
             OpenOptions::new().write(true).create(true).truncate(true).open(path)
@@ -35,7 +35,7 @@ impl Writer {
         Ok(Self { file, path: path.to_path_buf(), pending: Vec::new(), begun: 0, end: 0 })
     }
 
-    /// Writes what stands above the rows.
+    /// Writes the lines above the rows.
     ///
     /// # Errors
     /// If it cannot be written.
@@ -55,13 +55,13 @@ impl Writer {
         Ok(())
     }
 
-    /// The step is over: its rows stay as they are.
+    /// Ends a step: its rows are final.
     pub fn settle(&mut self) {
         self.pending.clear();
         self.begun = self.end;
     }
 
-    /// The step is spoiled: nothing is known of the strain in its rows.
+    /// Spoils a step: the strain in its rows becomes unknown.
     ///
     /// # Errors
     /// If they cannot be written.
@@ -75,7 +75,7 @@ impl Writer {
         Ok(())
     }
 
-    /// A file's writes are not buffered: whatever ends the program, it has whole rows.
+    /// Appends text without a buffer, so that the file has whole rows however the program ends.
     fn append(&mut self, text: &str) -> Result<(), CliError> {
         self.file.write_all(text.as_bytes()).map_err(|error| self.failed(&error))?;
         self.end += text.len() as u64;

@@ -1,4 +1,4 @@
-//! `refine`: noise and motion of the extended Kalman filter from readings alone.
+//! `refine`: noise and motion parameters of the extended Kalman filter from readings alone.
 
 mod rows;
 mod table;
@@ -55,7 +55,7 @@ pub fn run(args: &RefineArgs, messages: &Messages) -> Result<(), CliError> {
     Ok(())
 }
 
-/// An error of the likelihood with the file that it is about: the law and where the search starts are the sensor's.
+/// Adds the file that an error is about: the law and the start of the search come from the sensor's file.
 fn named(args: &RefineArgs, error: &CalibrationError) -> CliError {
     let of_sensor = matches!(
         error,
@@ -104,8 +104,8 @@ fn start(
     Ok((start, movable.into_iter().filter(is_wanted).collect()))
 }
 
-/// The parameters that can move: what is zero in the sensor file was left out by whoever made it, and the wander of
-/// branches that are not there tells nothing.
+/// Returns the parameters that can move. A parameter that is zero in the sensor file was left out by its author, and the wander
+/// of absent branches has no effect.
 fn movable(law: &LawParams, start: &NoiseStart) -> Vec<NoiseParameter> {
     let value = |parameter: NoiseParameter| parameter.get(&start.noise, &start.motion);
     let is_movable = |parameter: &NoiseParameter| match parameter {
@@ -129,7 +129,7 @@ fn remark_on_input(recording: &TraceFile, rows: &RelativeRows, params: &SensorPa
     }
 }
 
-/// Puts what was found in the place of the extended Kalman filter's noise and motion.
+/// Replaces the extended Kalman filter's noise and motion by the result.
 fn replace(params: &mut SensorParams, refinement: &Refinement) {
     if let Some(ekf) = params.estimators.get_mut(&EstimatorKind::Ekf) {
         (ekf.noise, ekf.motion) = (refinement.found.noise, refinement.found.motion);

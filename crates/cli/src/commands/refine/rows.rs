@@ -2,21 +2,21 @@ use ohmstrain::trace::TraceFile;
 
 use crate::error::CliError;
 
-/// Rows for which a maximum and its intervals take seconds; more of them are thinned, since the model is continuous in
-/// time.
+/// Largest number of rows, with which a maximum and its intervals take seconds. More rows are thinned, since the model is
+/// continuous in time.
 const MOST_ROWS: usize = 3000;
-/// Fewest readings, as for a calibration: ten for each parameter.
+/// Smallest number of readings, ten for each parameter, as for a calibration.
 const FEWEST_READINGS: usize = 60;
 
-/// The rows of a recording that are used, relative to R₀.
+/// The rows of a recording that are used, with readings relative to R₀.
 pub struct RelativeRows {
     /// Times, s.
     pub time_s: Vec<f64>,
     /// R/R₀ − 1; NaN where missing.
     pub value: Vec<f64>,
-    /// Noise of the electronics in each reading, standard deviation relative to R₀.
+    /// Standard deviation of the electronics' noise in each reading, relative to R₀.
     pub extra_sd: Vec<f64>,
-    /// Rows before thinning.
+    /// Number of rows before thinning.
     pub all: usize,
     /// Stride: one row in `stride` is used.
     pub stride: usize,

@@ -9,7 +9,7 @@ use crate::output;
 pub struct Refinement {
     /// Noise and motion of the sensor file.
     pub start: NoiseStart,
-    /// The parameters that were moved.
+    /// The parameters that were optimised.
     pub free: Vec<NoiseParameter>,
     /// The log-likelihood with the sensor file's noise.
     pub before: ReadingsLikelihood<f64>,
@@ -29,7 +29,7 @@ pub fn write(out: &mut dyn Write, refinement: &Refinement) -> Result<(), CliErro
             fitted.name.to_string(),
             number(parameter.get(&start.noise, &start.motion)),
             number(fitted.value),
-            // Away from a maximum the curvature says nothing about the parameter.
+            // Away from a maximum the curvature is no information on the parameter.
             fitted
                 .ln_standard_error
                 .filter(|_| found.fit.converged)
@@ -65,7 +65,7 @@ fn number(value: f64) -> String {
     format!("{value:.4e}")
 }
 
-/// `-` where the likelihood does not fall far enough before a bound, or no end was found.
+/// Formats an interval; `-` if the likelihood does not fall far enough before a bound, or no end was found.
 fn interval(profile: &ProfileInterval) -> String {
     let end = |end: Option<f64>| end.map_or_else(|| "-".into(), number);
     match (profile.lower, profile.upper) {

@@ -1,28 +1,28 @@
-//! Scopes in which results are needed: everywhere, or on one way of a choice only.
+//! Scopes in which results are needed: everywhere, or in one arm of a choice only.
 
 use ohmstrain_ekf::record::{Operation, Place};
 
-/// Least cost of a way that is worth a branch; a sum or a product costs one.
+/// Smallest cost of an arm that is worth a branch; a sum or a product costs one.
 const WORTH: usize = 10;
 
-/// The ways of choices, and on which of them each result is needed.
+/// Arms of choices, and the arm in which each result is needed.
 pub struct Scopes {
     /// Scope of each operation that is needed; the first scope is the whole function.
     of: Vec<usize>,
-    /// The scope around each.
+    /// Enclosing scope of each scope.
     around: Vec<usize>,
-    /// The branch that each choice is made by, if it is worth one.
+    /// The branch of each choice, if it is worth one.
     branch: Vec<Option<usize>>,
     branches: Vec<Branch>,
 }
 
-/// Choices by the same truth at the same place, made together.
+/// Choices by the same truth value in the same scope, made together.
 pub struct Branch {
     mask: Place,
     around: usize,
-    /// The scopes of both ways.
+    /// Scopes of both arms.
     pub arms: [usize; 2],
-    /// The choices, none of which takes another one's result.
+    /// The choices, none of which uses another one's result.
     pub choices: Vec<Place>,
 }
 
@@ -58,7 +58,7 @@ impl Scopes {
         scopes
     }
 
-    /// The ways of a choice: those of an earlier one by the same truth, if they can be made together.
+    /// Returns the arms of a choice: those of an earlier choice by the same truth value, if they can be made together.
     fn join(&mut self, operations: &[Operation], choice: Place, mask: Place, around: usize) -> [usize; 2] {
         let is_like = |branch: &Branch| {
             (branch.mask, branch.around) == (mask, around)
@@ -75,13 +75,13 @@ impl Scopes {
         self.branches[number].arms
     }
 
-    /// A new scope.
+    /// Creates a scope inside another one.
     fn inside(&mut self, around: usize) -> usize {
         self.around.push(around);
         self.around.len() - 1
     }
 
-    /// The innermost scope around two; a scope comes after those around it.
+    /// Returns the innermost scope that encloses both; a scope comes after those that enclose it.
     fn both(&self, mut a: usize, mut b: usize) -> usize {
         while a != b {
             if a > b {
@@ -93,7 +93,7 @@ impl Scopes {
         a
     }
 
-    /// Operations of each scope and those within it.
+    /// Computes the cost of each scope, including those within it.
     fn costs(&self, operations: &[Operation], uses: &[usize]) -> Vec<usize> {
         let mut costs = vec![0; self.around.len()];
         for (place, operation) in operations.iter().enumerate().filter(|(place, _)| uses[*place] > 0) {
@@ -105,12 +105,12 @@ impl Scopes {
         costs
     }
 
-    /// The branch that a choice is made by, if it is worth one.
+    /// Returns the branch of a choice, if it is worth one.
     pub fn branch_of(&self, choice: Place) -> Option<&Branch> {
         self.branch.get(choice).copied().flatten().and_then(|number| self.branches.get(number))
     }
 
-    /// Operations that the ways of a branch take and that are not theirs alone.
+    /// Returns the operations that the arms of a branch use and that others use, too.
     pub fn shared(&self, operations: &[Operation], uses: &[usize], branch: &Branch) -> Vec<Place> {
         let within = |place: Place| branch.arms.iter().any(|arm| self.both(self.of[place], *arm) == *arm);
         let last = branch.choices.iter().copied().max().unwrap_or(0);
@@ -130,7 +130,7 @@ fn takes(operations: &[Operation], result: Place, needed: Place) -> bool {
         || result > needed && operations[result].operands().any(|operand| takes(operations, operand, needed))
 }
 
-/// About how many sums an operation takes as long as.
+/// Returns the approximate time of an operation, in sums.
 const fn cost(operation: Operation) -> usize {
     match operation {
         Operation::Input(_)
@@ -154,7 +154,8 @@ mod tests {
 
     use super::Scopes;
 
-    /// `input 0 < 0 ? exp(input 1) : sqrt(input 2 + input 1)`, and that sum once more; one result is on a way, too.
+    /// Tests `input 0 < 0 ? exp(input 1) : sqrt(input 2 + input 1)`, with that sum used once more; one result lies in an arm,
+    /// too.
     #[test]
     fn what_one_way_needs_is_done_there() {
         let operations = [
