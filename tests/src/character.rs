@@ -1,4 +1,4 @@
-//! Character of a sensor, in numbers that need no model: real and simulated recordings must have them in common.
+//! Model-free characteristics of a sensor, which real and simulated recordings must share.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -16,21 +16,21 @@ pub struct Known {
 /// Character of a recording, each number in percent.
 #[derive(Clone, Copy, Debug)]
 pub struct Character {
-    /// Error of the cubic fitted to the first half over the second, of the strain's range.
+    /// Error over the second half of the cubic fitted to the first half, of the strain's range.
     pub static_cubic: f64,
     /// Mean distance of the readings on the way up and down at the same strain, of the readings' span.
     pub loop_area: f64,
     /// Rise of the reading above its value at the start of a release, of the span: the median over long releases.
     pub release_peak: f64,
-    /// Deviation of the minutes' means of what a cubic of strain for each direction leaves, of the span.
+    /// Standard deviation of one-minute means of the residual of a cubic of strain for each direction, of the span.
     pub drift: f64,
 }
 
-/// Between these shares of the sorted readings lies their span.
+/// Quantiles of the readings between which their span lies.
 const SPAN: (f64, f64) = (0.02, 0.98);
-/// Strain moves where its rate is above this share of its 90th percentile.
+/// Fraction of the 90th percentile of the rate above which strain counts as moving.
 const MOVES: f64 = 0.1;
-/// A release is long that goes through this share of the strain's range.
+/// Fraction of the strain's range that a long release covers.
 const LONG: f64 = 0.3;
 const BINS: usize = 10;
 
@@ -49,7 +49,7 @@ fn rms(values: impl Iterator<Item = f64>) -> f64 {
     (sum / n).sqrt()
 }
 
-/// Least squares.
+/// Returns the least-squares solution.
 fn fitted(rows: &[Vec<f64>], targets: &[f64]) -> DVector<f64> {
     let design = DMatrix::from_fn(rows.len(), rows.first().map_or(0, Vec::len), |i, j| rows[i][j]);
     let (normal, right) = (design.transpose() * &design, design.transpose() * DVector::from_column_slice(targets));
@@ -129,7 +129,7 @@ impl Known {
         rms(means.iter().map(|x| x - mean)) / self.span()
     }
 
-    /// The recording in numbers.
+    /// Returns the characteristics of the recording.
     #[must_use]
     pub fn character(&self) -> Character {
         let rates = self.rates();

@@ -10,55 +10,55 @@ use crate::Linear;
 pub struct Draws(ChaCha12Rng);
 
 impl Draws {
-    /// The stream of a seed.
+    /// Creates the stream of a seed.
     #[must_use]
     pub fn new(seed: u64) -> Self {
         Self(ChaCha12Rng::seed_from_u64(seed))
     }
 
-    /// Standard normal.
+    /// Draws a standard normal number.
     pub fn normal(&mut self) -> f64 {
         StandardNormal.sample(&mut self.0)
     }
 
-    /// Uniform in [0, 1).
+    /// Draws a uniform number in [0, 1).
     pub fn uniform(&mut self) -> f64 {
         (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// Independent standard normals.
+    /// Draws a vector of independent standard normal numbers.
     pub fn vector<const N: usize>(&mut self) -> SVector<f64, N> {
         SVector::from_fn(|_, _| self.normal())
     }
 
-    /// A matrix of them.
+    /// Draws a matrix of independent standard normal numbers.
     pub fn matrix<const N: usize>(&mut self) -> SMatrix<f64, N, N> {
         SMatrix::from_fn(|_, _| self.normal())
     }
 
-    /// A full covariance without small eigenvalues.
+    /// Draws a full covariance without small eigenvalues.
     pub fn covariance<const N: usize>(&mut self) -> SMatrix<f64, N, N> {
         let root = self.matrix::<N>();
         root * root.transpose() + SMatrix::identity() * 0.1
     }
 
-    /// A stable model with a full Q that is not small.
+    /// Draws a stable model with a full Q that is not small.
     pub fn linear_model<const N: usize>(&mut self) -> Linear<f64, N> {
         let raw = self.matrix::<N>();
         let noise = self.covariance();
         Linear { transition: raw * (0.9 / raw.norm()), noise, gradient: self.vector(), variance: 0.3 }
     }
 
-    /// Readings of the size of that model's, every fourth one missing.
+    /// Draws readings of the size of that model's, every fourth one missing.
     pub fn readings(&mut self, count: usize) -> Vec<Option<f64>> {
         (0..count).map(|k| (k % 4 != 2).then(|| 2.0 * self.normal())).collect()
     }
 }
 
-/// A square root of a covariance that may be singular: `root · rootᵀ`, by eigenvectors.
+/// Returns a square root of a possibly singular covariance, `root · rootᵀ`, from eigenvectors.
 #[must_use]
 pub fn square_root<const N: usize, const L: usize>(covariance: &Symmetric<f64, N, L>) -> SMatrix<f64, N, N> {
-    // Components of very different size: take the eigenvectors of the correlations.
+    // Components differ greatly in size, so the eigenvectors are those of the correlations.
     let sd = SVector::<f64, N>::from_fn(|i, _| covariance[(i, i)].max(0.0).sqrt());
     let share = |i: usize, j: usize| if sd[i] * sd[j] > 0.0 { covariance[(i, j)] / (sd[i] * sd[j]) } else { 0.0 };
     let correlations = nalgebra::DMatrix::from_fn(N, N, share).symmetric_eigen();

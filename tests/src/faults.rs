@@ -9,15 +9,15 @@ use ohmstrain::{Estimate, FilterBuilder, Flag};
 use ohmstrain_bench_data::Trace;
 use ohmstrain_bench_data::faults::Episode;
 
-/// Time before a fault that the filter has to settle, of which the last third is scored, s.
+/// Time before a fault for the filter to settle, s; the last third is scored.
 pub const BEFORE_S: f64 = 30.0;
-/// Time after a fault that is looked at, s.
+/// Time evaluated after a fault, s.
 pub const AFTER_S: f64 = 40.0;
-/// A filter has recovered once its error, averaged over two seconds, stays within this share of the full scale of what it would
-/// have been.
+/// Largest excess of a recovered filter's error over that without the fault, averaged over two seconds, as a fraction of full
+/// scale.
 const RECOVERED: f64 = 0.03;
 const AVERAGED_S: f64 = 2.0;
-/// Normal deviates that hold 95 %.
+/// Two-sided 95 % quantile of the standard normal distribution.
 const TWO_SIDED: f64 = 1.959_963_984_540_054;
 
 /// Output of a filter for a row.
@@ -51,7 +51,7 @@ impl Score {
         self.silent += f64::from(u8::from(!row.flagged && !covered));
     }
 
-    /// Both together.
+    /// Adds another score.
     pub fn merge(&mut self, other: &Self) {
         self.rows += other.rows;
         self.squares += other.squares;
@@ -66,19 +66,19 @@ impl Score {
         100.0 * (self.squares / self.rows).sqrt()
     }
 
-    /// Rows whose 95 % interval holds the truth, percent.
+    /// Rows whose 95 % interval contains the truth, percent.
     #[must_use]
     pub fn coverage(&self) -> f64 {
         100.0 * self.covered / self.rows
     }
 
-    /// Rows with a flag that says that something is wrong, percent.
+    /// Rows with a flag that reports a problem, percent.
     #[must_use]
     pub fn flagged(&self) -> f64 {
         100.0 * self.flagged / self.rows
     }
 
-    /// Rows whose interval does not hold the truth and that have no such flag, percent.
+    /// Rows whose interval misses the truth and that have no such flag, percent.
     #[must_use]
     pub fn silent(&self) -> f64 {
         100.0 * self.silent / self.rows
@@ -95,15 +95,15 @@ fn is_flagged(row: &Estimate) -> bool {
 /// Response of a filter to a fault.
 #[derive(Clone, Debug, Default)]
 pub struct Answer {
-    /// Settled rows before it.
+    /// Settled rows before the fault.
     pub before: Score,
-    /// Rows during it.
+    /// Rows during the fault.
     pub during: Score,
-    /// The first five seconds after it.
+    /// Rows of the first five seconds after the fault.
     pub soon: Score,
-    /// Later ones.
+    /// Later rows.
     pub later: Score,
-    /// Time after its end, s, at which each filter's error was the last time more than it would have been.
+    /// Time after the fault's end, s, at which each filter's error last exceeded that without the fault.
     pub recovery_s: Vec<f64>,
 }
 
@@ -117,7 +117,7 @@ impl Answer {
         self.recovery_s.extend(other.recovery_s);
     }
 
-    /// Episodes that were over within five seconds of the fault's end, percent.
+    /// Episodes with a recovery within five seconds of the fault's end, percent.
     #[must_use]
     pub fn recovered(&self) -> f64 {
         let soon = self.recovery_s.iter().filter(|seconds| **seconds <= 5.0).count();
@@ -131,7 +131,7 @@ impl Answer {
     }
 }
 
-/// Estimates of the library row by row, with the true strain; rows that the filter refuses are left out.
+/// Returns the library's estimates row by row, with the true strain; rows that the filter rejects are left out.
 #[must_use]
 pub fn estimates(builder: FilterBuilder, trace: &Trace) -> Vec<(Said, f64)> {
     let Ok(mut filter) = builder.build() else { return Vec::new() };
@@ -147,13 +147,14 @@ pub fn estimates(builder: FilterBuilder, trace: &Trace) -> Vec<(Said, f64)> {
     (0..trace.len()).filter_map(step).collect()
 }
 
-/// `OHMSTRAIN_LONG_RUN` of exported C: the one of its flags that does not say that something is wrong.
+/// `OHMSTRAIN_LONG_RUN` of exported C: its only flag that does not report a problem.
 const LONG_RUN: u32 = 256;
 
-/// The same of the compiled `replay.c` of an exported folder; rows whose time goes back, which it refuses, are left out.
+/// Returns the estimates of the compiled `replay.c` of an exported folder; rows whose time goes back, which it rejects,
+/// are left out.
 ///
 /// # Errors
-/// If it cannot be run, or prints something else.
+/// If it cannot be run, or its output has another form.
 pub fn replayed(program: &Path, trace: &Trace) -> std::io::Result<Vec<(Said, f64)>> {
     let strain = trace.reference.as_ref().map(|reference| &reference.values);
     let (mut recording, mut truths, mut last_s) = ("time_s,resistance_ohm\n".to_owned(), Vec::new(), f64::NEG_INFINITY);
@@ -183,7 +184,7 @@ pub fn replayed(program: &Path, trace: &Trace) -> std::io::Result<Vec<(Said, f64
     }
 }
 
-/// Puts a fault into a recording at some times and adds up what the filter says.
+/// Injects a fault into a recording at several times, and accumulates the filter's response.
 pub fn answer(
     run: &dyn Fn(&Trace) -> Vec<(Said, f64)>,
     trace: &Trace,
@@ -198,7 +199,7 @@ pub fn answer(
         let episode = Episode { from_s, until_s, seed: episode.seed + k as u64, ..episode };
         let faulty = run(&episode.put_into(&part));
         let clean = run(&part);
-        // A clock that is off does not end when the fault should.
+        // With a wrong clock, the fault does not end at its nominal time.
         let rows = |time_s: f64| part.time_s.partition_point(|time| *time < time_s);
         let end_s =
             faulty.get(rows(until_s) + faulty.len() - part.len().min(faulty.len())).map_or(until_s, |row| row.0.time_s);
@@ -222,8 +223,8 @@ pub fn answer(
     answer
 }
 
-/// Time after a fault's end at which the mean error was too large for the last time, s. Rows are compared from the end on, where
-/// both runs have the same.
+/// Returns the time after a fault's end at which the mean error was last too large, s. Rows are compared from the end backwards,
+/// where both runs have the same ones.
 fn recovery_s(faulty: &[(Said, f64)], clean: &[(Said, f64)], end_s: f64, full_scale: f64) -> f64 {
     let error = |(row, truth): &(Said, f64)| (row.strain - truth).abs();
     let pairs = faulty.iter().rev().zip(clean.iter().rev());

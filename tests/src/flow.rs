@@ -16,7 +16,7 @@ impl<const N: usize> Flow<N> {
     /// `A = (K - D/2) C⁻¹` with K antisymmetric solves `A C + C Aᵀ = -D`.
     ///
     /// # Panics
-    /// Never: a covariance without small eigenvalues has an inverse.
+    /// Never: a covariance without small eigenvalues is invertible.
     #[must_use]
     pub fn random(draws: &mut Draws) -> Self {
         let (stationary, diffusion, raw) = (draws.covariance::<N>(), draws.covariance::<N>(), draws.matrix::<N>());

@@ -1,4 +1,4 @@
-//! Models and random numbers that several tests share. The oracles stand in the tests themselves.
+//! Models and random numbers shared by several tests. The oracles are in the tests themselves.
 
 pub mod character;
 mod draws;
@@ -50,12 +50,12 @@ impl<T: Scalar, const N: usize, const L: usize> Channel<T, N, L> for Linear<T, N
     }
 }
 
-/// A model whose phase is known: the filter is told, and has nothing to guess.
+/// A model whose phase is given to the filter.
 #[derive(Clone, Copy, Debug)]
 pub struct KnownPhase<M> {
     /// The model.
     pub model: M,
-    /// The phase it is in.
+    /// The given phase.
     pub phase: Phase,
 }
 
@@ -81,7 +81,8 @@ impl<T: Scalar, M: Channel<T, N, L>, const N: usize, const L: usize> Channel<T, 
     }
 }
 
-/// The Rauch-Tung-Striebel smoother of a recording: beliefs at the times of `steps` given all readings.
+/// Smooths a recording with the Rauch-Tung-Striebel smoother; returns the beliefs at the times of `steps` given all
+/// readings.
 #[must_use]
 pub fn rts_smooth<T: Scalar, const N: usize, const L: usize>(steps: &[Step<T, N, L>]) -> Vec<Belief<T, N, L>> {
     let mut smoothed: Vec<_> = steps.iter().map(|step| step.posterior).collect();
@@ -92,7 +93,7 @@ pub fn rts_smooth<T: Scalar, const N: usize, const L: usize>(steps: &[Step<T, N,
     smoothed
 }
 
-/// A plausible sensor with `B` branches and Ornstein-Uhlenbeck motion; with a baseline if `N = B + 3`.
+/// Returns a plausible sensor with `B` branches and Ornstein-Uhlenbeck motion, with a baseline if `N = B + 3`.
 ///
 /// # Panics
 /// Never: the parameters are valid.
@@ -123,7 +124,8 @@ pub fn sensor<T: Scalar, const B: usize, const N: usize>() -> SwitchedModel<T, B
         .unwrap_or_else(|error| unreachable!("{error}"))
 }
 
-/// A linear sensor that stretches, rests and releases at 10 %/s, and whose branch tells stretching from releasing.
+/// Returns a linear sensor that stretches, rests and releases at 10 %/s, and whose branch distinguishes stretching from
+/// releasing.
 ///
 /// # Panics
 /// Never: the parameters are valid.

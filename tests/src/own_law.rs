@@ -1,5 +1,5 @@
-//! A sensor whose law filters know exactly, simulated in steps much finer than its rows: what a filter says wrongly of it, it
-//! says because of how it takes steps.
+//! A sensor whose law the filters have exactly, simulated in steps much finer than its rows, so that any error of a filter is
+//! due to its step length.
 
 use nalgebra::{SMatrix, SVector};
 use ohmstrain_ekf::{Belief, Dwell, Estimator, Evidence, Mixture, Reading, State, Substeps};
@@ -17,7 +17,7 @@ const STRAIN_MEAN: f64 = 0.15;
 const STRAIN_SD: f64 = 0.1;
 const RATE_SD: f64 = 0.08;
 const RATE_TIME_S: f64 = 1.5;
-/// Rate of a motion in phases.
+/// Mean rate of a motion in phases, 1/s.
 const PHASE_RATE: f64 = 0.08;
 const PHASE_RATE_SD: f64 = 0.03;
 const HOLD_S: f64 = 4.0;
@@ -31,7 +31,7 @@ pub enum Moves {
     Ou,
     /// The same with holds.
     OuAndHolds,
-    /// Phases of extend, hold and retract, whose gains hold whatever the sign of the rate at an instant.
+    /// Phases of extend, hold and retract, whose gains apply whatever the instantaneous sign of the rate.
     Phases,
 }
 
@@ -45,14 +45,14 @@ struct Body {
     baseline: f64,
 }
 
-/// Rows of a reading, relative to R₀, and the true strain.
+/// Simulates rows of a reading, relative to R₀, and the true strain.
 #[must_use]
 pub fn simulate(moves: Moves, dt_s: f64, seconds: f64, seed: u64) -> Vec<(f64, f64)> {
     let fine = 10_usize.max((dt_s / 0.004).ceil() as usize);
     let h = dt_s / fine as f64;
     let mut draws = Draws::new(seed);
     let (strain, rate) = (STRAIN_MEAN + STRAIN_SD * draws.normal(), RATE_SD * draws.normal());
-    // An acceleration was drawn here once; without it every recording would be another one.
+    // An acceleration used to be drawn here; without this draw every recording would change.
     draws.normal();
     let mut body = Body {
         strain,
@@ -71,8 +71,8 @@ pub fn simulate(moves: Moves, dt_s: f64, seconds: f64, seed: u64) -> Vec<(f64, f
         .collect()
 }
 
-/// Mean and deviation of the strain, and of the sum of the branches, `seconds` after a state without any reading: of
-/// motions that begin at states drawn from it, in steps of 2 ms.
+/// Returns mean and standard deviation of the strain, and of the sum of the branches, `seconds` after a state without
+/// any reading, from simulated motions that start at states drawn from it, in steps of 2 ms.
 #[must_use]
 pub fn spread_after<const K: usize>(
     (from, moves): (&Mixture<f64, 5, 15, K>, Moves),
@@ -96,7 +96,7 @@ pub fn spread_after<const K: usize>(
 }
 
 impl Body {
-    /// A state drawn from hypotheses with their weights and phases.
+    /// Draws a state from hypotheses with their weights and phases.
     fn drawn(parts: &[(f64, Belief<f64, 5, 15>)], phases: &[Phase], draws: &mut Draws) -> Self {
         let (mut left, mut which) = (draws.uniform(), 0);
         while which + 1 < parts.len() && left > parts[which].0 {
@@ -104,7 +104,8 @@ impl Body {
             which += 1;
         }
         let belief = &parts[which].1;
-        // What is known exactly has no variance, and no Cholesky factor: the strain of 10⁻⁶ that this adds is nothing.
+        // An exactly known state has no variance, so its covariance has no Cholesky factor; the strain of 10⁻⁶ added
+        // here is negligible.
         let covariance = belief.covariance.to_matrix() + SMatrix::<f64, 5, 5>::identity() * 1e-12;
         let factor = covariance.cholesky().map_or_else(SMatrix::zeros, |cholesky| cholesky.l());
         let state = belief.mean + factor * SVector::<f64, 5>::from_fn(|_, _| draws.normal());
@@ -119,7 +120,7 @@ impl Body {
         }
     }
 
-    /// Euler and Maruyama's step.
+    /// Takes an Euler-Maruyama step.
     fn move_on(&mut self, moves: Moves, h: f64, draws: &mut Draws) {
         let old = self.rate;
         match moves {
@@ -195,7 +196,7 @@ fn law() -> SensorLaw<f64, 2> {
     }
 }
 
-/// The model of the body.
+/// Returns the model of the sensor and the body.
 ///
 /// # Panics
 /// Never: its parameters are fixed.
@@ -218,7 +219,7 @@ pub fn dwell(moves: Moves) -> Dwell<f64> {
     Dwell::new(HOLD_S, MOVE_S, reversal).unwrap_or_else(|_| unreachable!("fixed parameters"))
 }
 
-/// Nothing limits the strain.
+/// Evidence with limits that no strain reaches.
 pub const EVIDENCE: Evidence<f64> = Evidence { limits: FAR, tempering: 1.0 };
 
 /// Consistency of a filter on such recordings.
@@ -231,7 +232,7 @@ pub struct Honesty {
 }
 
 impl Honesty {
-    /// Share of the rows whose 95 % interval holds the strain, per cent.
+    /// Share of the rows whose 95 % interval contains the strain, percent.
     #[must_use]
     pub fn coverage(&self) -> f64 {
         100.0 * self.inside / self.rows
@@ -250,8 +251,8 @@ impl Honesty {
     }
 }
 
-/// Runs an estimator over recordings of 60 s with these seeds; the first 5 s are not scored. With `third_missing` a random
-/// third of the rows has no reading.
+/// Runs an estimator over recordings of 60 s with these seeds; the first 5 s are not scored. With `third_missing`, a
+/// random third of the rows has no reading.
 pub fn honesty<E, const N: usize, const L: usize>(
     estimator: E,
     start: &E::State,
@@ -280,10 +281,10 @@ where
     honesty
 }
 
-/// The state after rows that each have this reading, or none.
+/// Returns the state after rows that each have this reading, or none.
 ///
 /// # Panics
-/// If the estimator refuses a step.
+/// If the estimator rejects a step.
 pub fn after_rows<E, const N: usize, const L: usize>(
     estimator: E,
     start: &E::State,

@@ -1,4 +1,4 @@
-//! The sweep of faults: which ones, how much, on which recordings, and a row of its table.
+//! The sweep of faults: kinds, severities, recordings, and rows of its table.
 
 use ohmstrain::{EstimatorKind, Sensor};
 use ohmstrain_bench_data::Trace;
@@ -9,12 +9,12 @@ use crate::faults::{AFTER_S, Answer, BEFORE_S, Said, answer, estimates};
 
 /// A sensor calibrated on the first half of the demo's recording: `ohmstrain demo --seed 1`, version 0.1.0.
 pub const SENSOR: &str = include_str!("../fixtures/representative.toml");
-/// Times at which every fault begins.
+/// Number of onset times of every fault.
 const ONSETS: usize = 6;
-/// The calibration's rows are not scored.
+/// End of the calibration's rows, which are not scored, s.
 const CALIBRATED_UNTIL_S: f64 = 200.0;
 
-/// A fault with its severity and how long it lasts, s.
+/// A fault with its severity and duration.
 #[derive(Clone, Copy, Debug)]
 pub struct Case {
     /// Name in the table.
@@ -68,10 +68,10 @@ pub const CASES: [Case; 35] = [
     case("clock twice as fast, 20 s", Fault::WrongRate { factor: 2.0 }, 20.0),
 ];
 
-/// The rest of the recording that was calibrated on, and another one of the same sensor.
+/// Returns the rest of the calibration recording, and another recording of the same sensor.
 ///
 /// # Errors
-/// Never: a bench can have these settings.
+/// Never: the settings are valid.
 pub fn recordings() -> Result<[Trace; 2], SettingsError> {
     let recording = |seed: u64| {
         simulate(&SimulationSettings {
@@ -87,7 +87,7 @@ pub fn recordings() -> Result<[Trace; 2], SettingsError> {
 /// A filter: estimates of a recording, row by row, with the true strain.
 pub type Run<'a> = Box<dyn Fn(&Trace) -> Vec<(Said, f64)> + 'a>;
 
-/// The sensor's default, or another estimator, as the library has it.
+/// Returns a run of the library with an estimator of the sensor.
 #[must_use]
 pub fn of_library(sensor: &Sensor, kind: EstimatorKind) -> Run<'_> {
     Box::new(move |trace| estimates(sensor.filter().estimator(kind), trace))
@@ -102,7 +102,7 @@ pub fn answer_to(run: &Run, case: &Case, traces: &[Trace]) -> Answer {
         let (low, high) = strain.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
         let last_s = trace.time_s.last().copied().unwrap_or(0.0) - AFTER_S - case.lasts_s;
         let first_s = CALIBRATED_UNTIL_S.max(BEFORE_S);
-        // An odd fraction of a second, so that no onset is a turn of the machine.
+        // An odd fraction of a second, so that no onset coincides with a turn of the machine.
         let onset = |k: usize| first_s + 0.73 + (last_s - first_s - 1.0) * k as f64 / (ONSETS - 1) as f64;
         let onsets: [f64; ONSETS] = std::array::from_fn(onset);
         let episode = Episode { fault: case.fault, from_s: 0.0, until_s: case.lasts_s, seed: 1 };
@@ -111,7 +111,7 @@ pub fn answer_to(run: &Run, case: &Case, traces: &[Trace]) -> Answer {
     sum
 }
 
-/// A row of the table, in Markdown.
+/// Returns a row of the table, in Markdown.
 #[must_use]
 pub fn row(name: &str, run: &Run, case: &Case, traces: &[Trace]) -> String {
     let said = answer_to(run, case, traces);

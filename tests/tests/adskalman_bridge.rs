@@ -1,5 +1,5 @@
-//! The sensor's own law, linearised once, through adskalman's filter and smoother. The offsets of the linearisation are what
-//! random linear models do not have.
+//! The sensor's own law, linearised once, in adskalman's filter and smoother. Unlike random linear models, the linearisation
+//! has offsets.
 
 use adskalman::{KalmanFilterNoControl, StateAndCovariance};
 use nalgebra::SVector;
@@ -19,7 +19,7 @@ fn linearised() -> (Belief<f64, 5, 15>, Linearised) {
     (start, (transition, Channel::observe(&model, &prior, Some(Phase::Extend))))
 }
 
-/// The linearised law as a linear model of ours, around the same points.
+/// The linearised law as a linear model of this crate, around the same points.
 struct Frozen {
     from: SVector<f64, 5>,
     step: Linearised,
@@ -64,8 +64,8 @@ fn filter_and_smoother_agree_with_adskalman() {
     for (ours, theirs) in steps.iter().zip(&theirs) {
         assert_same(&ours.posterior, theirs);
     }
-    // adskalman's smoother knows linear transitions without offset only: smooth deviations from a path that follows
-    // the offset.
+    // adskalman's smoother supports only linear transitions without offset, so deviations from a path that follows the
+    // offset are smoothed.
     let mut path = start.mean;
     let mut deviations = Vec::new();
     let mut paths = Vec::new();

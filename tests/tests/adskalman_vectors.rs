@@ -1,5 +1,5 @@
-//! Several readings at once through adskalman against one after the other through our filter, and against the textbook's
-//! vector update where their noises are correlated.
+//! Several readings at once in adskalman, compared with one after the other in our filter, and with the textbook's
+//! vector update for correlated noise.
 
 use adskalman::{KalmanFilterNoControl, StateAndCovariance};
 use nalgebra::{Const, SMatrix, SVector, matrix, vector};
@@ -46,8 +46,8 @@ fn others(sensor: Sensor) -> [Other; 2] {
     ]
 }
 
-/// Resistance first, nonlinear and linearised at the prior in both; the others are linear, so that it does not matter
-/// where they are linearised. Each component is missing now and then, and sometimes all are.
+/// Resistance comes first, nonlinear and linearised at the prior in both; the others are linear, so their linearisation
+/// point does not matter. Each component is sometimes missing, and sometimes all are.
 #[test]
 fn three_readings_at_once_are_three_readings_in_turn() {
     let sensor = sensor::<f64, 2, 5>();
@@ -77,7 +77,7 @@ fn three_readings_at_once_are_three_readings_in_turn() {
         for (other, reading) in others.iter().zip(&readings[1..]) {
             belief = Ekf::new(*other).step(&belief, 0.0, *reading).unwrap().posterior;
         }
-        // Per step a rounding times the condition of S, 1e2; the filter forgets within some hundred steps.
+        // Per step one rounding times the condition number of S, 1e2; the filter forgets within about a hundred steps.
         let tolerance = 1e2 * 1e2 * f64::EPSILON;
         for i in 0..5 {
             assert!((belief.mean[i] - theirs.state()[i]).abs() < tolerance, "mean[{i}] at {k}");
@@ -90,7 +90,7 @@ fn three_readings_at_once_are_three_readings_in_turn() {
     }
 }
 
-/// Two readings with a common noise: K = P Hᵀ (H P Hᵀ + R)⁻¹, written out. With one missing, its noise says nothing.
+/// Two readings with a common noise: K = P Hᵀ (H P Hᵀ + R)⁻¹, written out. If one is missing, its noise has no effect.
 #[test]
 fn correlated_noise_is_the_vector_update() {
     let sensor = sensor::<f64, 2, 5>();
@@ -111,7 +111,7 @@ fn correlated_noise_is_the_vector_update() {
     let h = SMatrix::<f64, 2, 5>::from_rows(&others.map(|other| other.gradient.transpose()));
     let gain = prior * h.transpose() * (h * prior * h.transpose() + noise).try_inverse().unwrap();
     let both = run([Some(y[0].into()), Some(y[1].into())]);
-    // Numbers below one, products of five terms, and a matrix of condition 10 inverted.
+    // Numbers below one, products of five terms, and the inverse of a matrix with condition number 10.
     assert!((both.state() - (by.mean + gain * (y - h * by.mean))).amax() < 1e-14);
     assert!((both.covariance() - (prior - gain * h * prior)).amax() < 1e-15);
 

@@ -1,10 +1,10 @@
-//! R₀ of another day, told or not.
+//! R₀ of another day, given or not.
 
 use ohmstrain::{Estimate, FilterBuilder, Sensor};
 use ohmstrain_tests::sweep::{SENSOR, recordings};
 
-/// Errors of the filter's last half, and of all the smoother's rows, %FS, of another recording of the sensor with all
-/// readings times a factor.
+/// Returns the errors, %FS, of the filter's last half and of all the smoother's rows, on another recording of the
+/// sensor with all readings times a factor.
 fn errors(sensor: &Sensor, factor: f64, with: impl Fn(FilterBuilder) -> FilterBuilder) -> [f64; 2] {
     let [_, trace] = recordings().unwrap();
     let strain = &trace.reference.as_ref().unwrap().values;
@@ -21,8 +21,8 @@ fn errors(sensor: &Sensor, factor: f64, with: impl Fn(FilterBuilder) -> FilterBu
     [rms(&filtered[half..], &strain[half..]), rms(&smoothed, strain)]
 }
 
-/// All readings are a half higher, and nobody says so. R₀ goes no farther than readings want it to, so that some of the
-/// error stays; told, the readings are the same as before.
+/// All readings are higher by half, and R₀ is not given. R₀ moves only as far as the readings require, so part of the
+/// error remains. With a given R₀, the relative readings are the same as before.
 #[test]
 fn another_day_is_found_where_the_sensor_moves_as_in_calibration() {
     let sensor = Sensor::from_toml(SENSOR).unwrap();
@@ -39,14 +39,14 @@ fn another_day_is_found_where_the_sensor_moves_as_in_calibration() {
     }
 }
 
-/// R₀ stays on the day of the calibration, whose readings stay in the calibrated range.
+/// R₀ does not move on the day of the calibration, whose readings stay in the calibrated range.
 #[test]
 fn nothing_is_followed_on_the_day_of_the_calibration() {
     let sensor = Sensor::from_toml(SENSOR).unwrap();
     let rested = sensor.params().rested();
     let held = errors(&sensor, 1.0, |filter| filter.rest_resistance(rested));
     for (held, followed) in held.into_iter().zip(errors(&sensor, 1.0, |filter| filter)) {
-        // R₀ told is R₀ followed to a rounding of 1e-16.
+        // A given R₀ equals the tracked one to a rounding of 1e-16.
         assert!((followed - held).abs() < 1e-6 * held, "{held} {followed}");
     }
 }

@@ -1,5 +1,5 @@
-//! A few hypotheses stand for all of them, however often the sensor is read: what is unlikely in each of many short steps and
-//! likely in all of them together is not lost between them.
+//! A few hypotheses represent all of them at any sampling rate: motions that are unlikely in each of many short steps, but
+//! likely in all together, are not lost.
 
 use ohmstrain_ekf::{Belief, Dwell, Evidence, Mixture, Reading, SignSplit};
 use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, Phase, SensorLaw, StrainRange, SwitchedModel};
@@ -9,7 +9,7 @@ const SLOPE: f64 = 2.0;
 const TAU_S: f64 = 20.0;
 const EXTEND_GAIN: f64 = 0.8;
 const RETRACT_GAIN: f64 = -0.6;
-/// One reading tells little of the strain, many of them much.
+/// One reading carries little information on the strain, many carry much.
 const READING_SD: f64 = 0.03;
 const HOLD_S: f64 = 30.0;
 const MOVE_S: f64 = 2.0;
@@ -39,7 +39,7 @@ fn model() -> SwitchedModel<f64, 1, 4> {
     SwitchedModel::new(law, motion, noise).unwrap()
 }
 
-/// Readings and strains of a body that mostly rests, every `dt_s`, simulated in steps ten times finer.
+/// Returns readings and strains of a body that mostly rests, every `dt_s`, simulated in steps ten times finer.
 fn rows(dt_s: f64, seconds: f64, seed: u64) -> Vec<(f64, f64)> {
     let mut draws = Draws::new(seed);
     let h = dt_s / 10.0;
@@ -65,7 +65,7 @@ fn rows(dt_s: f64, seconds: f64, seed: u64) -> Vec<(f64, f64)> {
     (0..(seconds / dt_s) as usize).map(|_| row()).collect()
 }
 
-/// Mean negative log density of the true strain, but for a constant, with `K` hypotheses.
+/// Returns the mean negative log density of the true strain, without its constant, with `K` hypotheses.
 fn surprise<const K: usize>(dt_s: f64, rows: &[(f64, f64)]) -> f64 {
     let hold = Dwell::new(HOLD_S, MOVE_S, 0.0).unwrap();
     let evidence = Evidence::new(FAR, 1.0).unwrap();
@@ -80,8 +80,8 @@ fn surprise<const K: usize>(dt_s: f64, rows: &[(f64, f64)]) -> f64 {
     rows.iter().map(of_row).sum::<f64>() / rows.len() as f64
 }
 
-/// Eight hypotheses in place of sixty-four cost less than a quarter nat, as a deviation 28 % too large would. With the
-/// lightest hypotheses dropped, not merged, they cost 1.6 nats at 0.02 s, and 0.3 at 0.1 s.
+/// Eight hypotheses instead of sixty-four cost less than a quarter nat, as much as a standard deviation 28 % too large.
+/// If the lightest hypotheses are dropped, not merged, they cost 1.6 nats at 0.02 s, and 0.3 at 0.1 s.
 #[test]
 fn eight_hypotheses_do_for_sixty_four_at_any_sampling() {
     for dt_s in [0.02, 0.1, 0.5] {

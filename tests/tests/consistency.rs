@@ -1,6 +1,6 @@
-//! Is the filter's own uncertainty right? On a linear sensor with a known phase, simulated from its own model, NIS and
-//! NEES are χ² exactly, and so are their sums over independent terms; the bounds are quantiles of those sums at 99.9 %.
-//! The same statistics must leave the bounds when the filter is told a wrong Q or R: a test that cannot fail would prove
+//! Consistency of the filter's uncertainty. On a linear sensor with a known phase, simulated from its own model, NIS and
+//! NEES are exactly χ², and so are their sums over independent terms; the bounds are 99.9 % quantiles of those sums.
+//! With a wrong Q or R in the filter, the same statistics must leave the bounds: a test that cannot fail would prove
 //! nothing.
 
 use nalgebra::{Cholesky, SVector};
@@ -13,13 +13,13 @@ const RUNS: u64 = 400;
 const ROWS: usize = 60;
 const DT_S: f64 = 0.2;
 
-/// A sensor that is known to stretch, as the filter is told it is.
+/// A sensor known to stretch, with the noise that the filter assumes.
 #[derive(Clone, Copy)]
 struct Told {
     sensor: KnownPhase<SwitchedModel<f64, 1, 3>>,
     /// Factor on the filter's Q.
     process: f64,
-    /// Factor on its R.
+    /// Factor on the filter's R.
     reading: f64,
 }
 
@@ -52,7 +52,7 @@ fn told(process: f64, reading: f64) -> Told {
     Told { sensor: KnownPhase { model: switching_sensor(), phase: Phase::Extend }, process, reading }
 }
 
-/// Sums of χ² terms that are independent of each other.
+/// Sums of independent χ² terms.
 #[derive(Debug, Default)]
 struct Statistics {
     /// Over all rows of all runs: innovations of different rows are independent.
@@ -63,7 +63,7 @@ struct Statistics {
     smoothed: f64,
 }
 
-/// Squared distance of truth and belief in units of the belief's covariance.
+/// Returns the squared distance of truth and belief in units of the belief's covariance.
 fn nees(truth: &SVector<f64, 3>, belief: &Belief<f64, 3, 6>) -> f64 {
     let error = truth - belief.mean;
     error.dot(&Cholesky::new(belief.covariance.to_matrix()).unwrap().solve(&error))
@@ -101,7 +101,8 @@ fn statistics(assumed: Told) -> Statistics {
     sums
 }
 
-/// Compares a sum of χ² terms, with that many degrees of freedom in all, with its 99.9 % range: below, inside or above.
+/// Compares a sum of χ² terms, with `freedom` degrees of freedom in total, with its 99.9 % range: below, inside or
+/// above.
 fn place(sum: f64, freedom: u64) -> std::cmp::Ordering {
     let chi_squared = ChiSquared::new(freedom as f64).unwrap();
     match sum {
@@ -121,7 +122,7 @@ fn a_matched_filter_and_smoother_are_consistent() {
     assert_eq!(places(&sums), [std::cmp::Ordering::Equal; 3], "{sums:?}");
 }
 
-/// Noise that is believed too large makes every statistic too small, and the other way round.
+/// Assumed noise that is too large makes every statistic too small, and vice versa.
 #[test]
 fn a_wrong_filter_is_found_out() {
     for (factor, side) in [(4.0, std::cmp::Ordering::Less), (0.25, std::cmp::Ordering::Greater)] {

@@ -1,14 +1,15 @@
-//! Comparison with the least possible error. No estimator has a smaller mean squared error than the posterior Cramér-Rao bound
-//! (Tichavský, Muravchik, Nehorai, *IEEE Trans. Signal Process.* 46 (1998) 1386). With the phase known, constant gains
-//! and no limits the sensor's state moves linearly, and the bound's recursion is exact:
-//! `J' = (Q + F J⁻¹ Fᵀ)⁻¹ + E[H Hᵀ]/R`, in the form that also takes a singular Q. The gauge curve bends, but its slope
-//! stays away from zero, so that a filter that linearises well can come close.
+//! Comparison with the smallest possible error. No estimator has a smaller mean squared error than the posterior Cramér-Rao
+//! bound (Tichavský, Muravchik, Nehorai, *IEEE Trans. Signal Process.* 46 (1998) 1386). With the phase known, constant gains
+//! and no limits the sensor's state moves linearly, and the bound's recursion is exact: `J' = (Q + F J⁻¹ Fᵀ)⁻¹ + E[H Hᵀ]/R`,
+//! in the form valid for a singular Q. The gauge curve is nonlinear, but its slope stays away from zero, so a filter that
+//! linearises well can come close.
 //!
-//! The bound can be out of reach: it averages H Hᵀ over all paths. Where readings are so fine that only the changing slope
-//! would tell strain from branch, the average knows more than any one path shows. With `reading_sd` 2e-3, `branch_sd` 5e-3
-//! and `rate_sd` 0.05, a particle filter of 20 000 particles stayed 1.15 times above the bound from a start known to 0.01,
-//! as did all filters here, and 1.40 times from an unknown start, where the unscented filter had 1.53 and the
-//! extended 2.07 (300 runs). The two cases below have coarser readings, and particles came to 1.04 and 1.05.
+//! The bound may be unattainable, because it averages H Hᵀ over all paths. If readings are so precise that only the
+//! changing slope distinguishes strain from branch, the average contains more information than any single path. With
+//! `reading_sd` 2e-3, `branch_sd` 5e-3 and `rate_sd` 0.05, a particle filter of 20 000 particles stayed 1.15 times above
+//! the bound from a start known to 0.01, as did all filters here. From an unknown start it stayed 1.40 times above; the
+//! unscented filter reached 1.53 and the extended one 2.07 (300 runs). The two cases below have coarser readings; there
+//! the particle filter reached 1.04 and 1.05.
 
 use nalgebra::{SMatrix, SVector};
 use ohmstrain_ekf::{Belief, Channel, Dynamics, Ekf, Reading};
@@ -26,7 +27,7 @@ const ROWS: usize = 40;
 const DT_S: f64 = 0.1;
 const EXTEND: Direction<f64> = Direction::Known(Phase::Extend);
 
-/// A sensor, and what is known of its state at the start.
+/// A sensor, and the initial belief about its state.
 #[derive(Clone, Copy)]
 struct Case {
     sensor: Sensor,
@@ -55,12 +56,12 @@ impl Case {
         Self { sensor, start: start.unwrap_or_else(|| Belief::initial(&sensor)) }
     }
 
-    /// Nothing known but where strains lie in the long run.
+    /// Returns the case of a start with the stationary distribution.
     fn unknown_start() -> Self {
         Self::new(0.02, 0.01, 0.15, None)
     }
 
-    /// Strain known to a hundredth, then lost again while the body moves.
+    /// Returns the case of a strain first known to a hundredth, then lost as the body moves.
     fn known_start() -> Self {
         let start = Belief::independent(State::from([0.1, 0.0, 0.0]), &[1e-4, 1e-2, 2.5e-5]);
         Self::new(0.005, 0.005, 0.1, Some(start))
@@ -74,8 +75,8 @@ impl Case {
         self.sensor.transition(&self.sensor.prepare(DT_S), state, EXTEND)
     }
 
-    /// E[H Hᵀ]/R for a Gaussian strain: only the slope of the gauge depends on the state. Simpson's rule over ±8
-    /// deviations.
+    /// Returns E[H Hᵀ]/R for a Gaussian strain, where only the slope of the gauge depends on the state. Simpson's rule
+    /// over ±8 standard deviations.
     fn information(&self, strain_mean: f64, strain_variance: f64) -> Matrix {
         let (intervals, sd) = (2000, strain_variance.sqrt());
         let mut sum = Matrix::zeros();
@@ -89,7 +90,8 @@ impl Case {
         sum
     }
 
-    /// The bound of the strain's mean squared error at every row; `information` takes mean and variance of the strain.
+    /// Returns the bound of the strain's mean squared error at every row; `information` takes mean and variance of the
+    /// strain.
     #[allow(non_snake_case, reason = "the letters of the source")]
     fn bound(&self, information: impl Fn(f64, f64) -> Matrix) -> Vec<f64> {
         let (mut mean, mut prior) = (self.start.mean, self.start.covariance.to_matrix());
@@ -107,7 +109,7 @@ impl Case {
         bounds
     }
 
-    /// Mean squared error of strain at every row, over all runs.
+    /// Returns the mean squared error of strain at every row, over all runs.
     fn errors<M: Dynamics<f64, 3, 6> + Channel<f64, 3, 6>>(&self, filter: &Ekf<M>) -> Vec<f64> {
         let prepared = filter.model().prepare(DT_S);
         let initial = square_root(&self.start.covariance);
@@ -127,14 +129,14 @@ impl Case {
         errors
     }
 
-    /// Root mean squared error over the bound, of all rows together.
+    /// Returns the root mean squared error of all rows, divided by the bound.
     fn efficiency<M: Dynamics<f64, 3, 6> + Channel<f64, 3, 6>>(&self, filter: &Ekf<M>) -> f64 {
         let bound: f64 = self.bound(|mean, variance| self.information(mean, variance)).iter().sum();
         (self.errors(filter).iter().sum::<f64>() / bound).sqrt()
     }
 }
 
-/// The sensor with its curve replaced by the tangent at one strain: what a filter does that linearises once.
+/// The sensor with its curve replaced by the tangent at one strain, as in a filter that linearises once.
 #[derive(Clone, Copy)]
 struct LinearisedOnce {
     sensor: KnownPhase<Sensor>,
@@ -167,8 +169,8 @@ impl Channel<f64, 3, 6> for LinearisedOnce {
     }
 }
 
-/// From below: errors of a run's rows are correlated, at worst altogether, which leaves one χ² per run; a root mean square
-/// of n of those is 1 ± 1/√(2n), and 3.29 of these deviations are 99.9 %.
+/// Returns the lower bound of the efficiency. Errors of a run's rows are correlated, at worst completely, which leaves one
+/// χ² per run. A root mean square of n of those is 1 ± 1/√(2n), and 3.29 of these standard deviations are 99.9 %.
 fn least() -> f64 {
     1.0 - 3.29 / (2.0 * RUNS as f64).sqrt()
 }
@@ -184,7 +186,7 @@ fn the_extended_filter_comes_within_a_tenth_of_the_bound() {
     }
 }
 
-/// The curve matters: a filter that takes it for a line misses the bound by far, so coming close means something.
+/// The curve matters: a filter that assumes a straight line misses the bound by far, so coming close is significant.
 #[test]
 fn a_filter_that_linearises_once_does_not() {
     for case in [Case::unknown_start(), Case::known_start()] {
@@ -194,8 +196,8 @@ fn a_filter_that_linearises_once_does_not() {
     }
 }
 
-/// The bound on a straight gauge curve is the Kalman filter's own variance, which a dense joint Gaussian confirms
-/// elsewhere: the recursion of this test is right.
+/// The bound on a straight gauge curve is the Kalman filter's own variance, which another test confirms with a dense
+/// joint Gaussian. This verifies the recursion.
 #[test]
 fn on_a_straight_gauge_curve_the_bound_is_the_kalman_filter_s_variance() {
     let case = Case::unknown_start();
@@ -205,7 +207,7 @@ fn on_a_straight_gauge_curve_the_bound_is_the_kalman_filter_s_variance() {
     let mut belief = case.start;
     for bound in bounds {
         belief = Ekf::new(line).step(&belief, DT_S, Some(Reading::from(0.2))).unwrap().posterior;
-        // Four inversions of matrices with condition numbers of some 1e5 lose 4e5 ε = 1e-10.
+        // Four inversions of matrices with condition numbers of about 1e5 lose 4e5 ε = 1e-10.
         assert!((bound / belief.covariance[(0, 0)] - 1.0).abs() < 1e-9);
     }
 }

@@ -1,5 +1,5 @@
-//! Path that the direction of motion leaves open: its mean and variance against simulations of the continuous law, written out
-//! here or in `own_law`, and the coverage of intervals at any sampling rate.
+//! Excess path due to an uncertain direction: its mean and variance, compared with simulations of the continuous law, written
+//! out here or in `own_law`, and the coverage of intervals at any sampling rate.
 
 use ohmstrain_ekf::{Belief, Ekf, Estimator, Hypotheses, Mixture, SignSplit, State, Substeps};
 use ohmstrain_model::{Phase, RateChange, Turning, unexplained};
@@ -7,7 +7,7 @@ use ohmstrain_tests::Draws;
 use ohmstrain_tests::own_law::{EVIDENCE, Honesty, Moves, after_rows, dwell, honesty, sensor, simulate, spread_after};
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
-/// The fit is stated to be off by 3 % of its maximum; the exact moments of max(v, 0) are in any textbook.
+/// The stated error of the fit is 3 % of its maximum; the exact moments of max(v, 0) are in any textbook.
 #[test]
 fn the_unexplained_variance_of_a_switch_is_that_of_the_normal_distribution() {
     let normal = Normal::standard();
@@ -24,16 +24,17 @@ fn the_unexplained_variance_of_a_switch_is_that_of_the_normal_distribution() {
     assert!((unexplained(0.5, 0.5, 4.0) - 4.0 * exact(0.0)).abs() < 1e-12);
 }
 
-/// Paths of a Brownian rate that start beyond zero with exponential density: the mean path beyond what the sign at the end
-/// makes of the net move. One standard error of the mean of 40 000 paths is 2.4 % of it; the density falls off by 0.95/20, 4.8
-/// %, within reach of zero, which the formula leaves out. The seed is fixed.
+/// Paths of a Brownian rate that start beyond zero with exponential density: the mean path beyond the net displacement, in the
+/// direction of the final sign. One standard error of the mean of 40 000 paths is 2.4 % of it. The density falls off by
+/// 0.95/20, 4.8 %, within reach of zero, which the formula neglects. The seed is fixed.
 #[test]
 fn a_rate_turns_around_as_far_as_stated() {
     const SCALE: f64 = 20.0;
     const FINE: usize = 400;
     let mut draws = Draws::new(7);
     let (mut sum, mut count) = (0.0, 0.0);
-    // Importance: only starts within 6 deviations of zero can turn around; the others add nothing.
+    // Importance sampling: only starts within 6 standard deviations of zero can turn around; the others contribute
+    // nothing.
     let reach = 6.0;
     for _ in 0..40_000 {
         let start = reach * draws.uniform();
@@ -54,9 +55,9 @@ fn a_rate_turns_around_as_far_as_stated() {
     assert!((excess / simulated - 1.0).abs() < 0.07, "{excess} vs {simulated}");
 }
 
-/// Given the rates at both ends, the same path beyond the net move's still varies: half the mean square difference of two
-/// Brownian bridges between them. One standard error of the mean of 50 000 pairs is 2.4 % of it, and the seed is fixed; the
-/// density falls off by 0.95/20 within reach of zero, which the formula has to first order.
+/// Variance of that excess path given the rates at both ends: half the mean squared difference of two Brownian bridges
+/// between them. One standard error of the mean of 50 000 pairs is 2.4 % of it, and the seed is fixed. The density falls
+/// off by 0.95/20 within reach of zero, which the formula includes to first order.
 #[test]
 fn between_known_rates_the_way_varies_as_stated() {
     const SCALE: f64 = 20.0;
@@ -89,9 +90,9 @@ fn between_known_rates_the_way_varies_as_stated() {
     assert!((variance / simulated - 1.0).abs() < 0.1, "{variance} vs {simulated}");
 }
 
-/// The sum of the branches, without a reading for 10 and 60 s, spreads as it does in many simulated motions, in one step or in
-/// many. The logistic distribution makes E|v| 2.1 % larger than the normal one does; a mean of 1200 motions is off by four
-/// standard errors at most. The deviation is stated within 20 %, of which 8 % may be chance (four standard errors).
+/// The sum of the branches, without a reading for 10 and 60 s, spreads as in many simulated motions, in one step or in many.
+/// The logistic distribution makes E|v| 2.1 % larger than the normal one. A mean of 1200 motions is off by at most four
+/// standard errors. The stated standard deviation must agree within 20 %, of which 8 % may be chance (four standard errors).
 #[test]
 fn a_pause_widens_the_belief_as_the_law_does_however_it_is_written_down() {
     const MOTIONS: u64 = 1200;
@@ -101,7 +102,7 @@ fn a_pause_widens_the_belief_as_the_law_does_however_it_is_written_down() {
         let p = &belief.covariance;
         (belief.mean[2] + belief.mean[3], (p[(2, 2)] + p[(3, 3)] + 2.0 * p[(2, 3)]).sqrt())
     };
-    // Readings less strain are branches, baseline and noise; the baseline's variance is known.
+    // Readings minus the gauge's part are branches, baseline and noise; the baseline's variance is known.
     for seconds in [10.0, 60.0] {
         let sums: Vec<f64> = (0..MOTIONS)
             .map(|seed| {
@@ -136,7 +137,7 @@ fn a_pause_widens_the_belief_as_the_law_does_however_it_is_written_down() {
     }
 }
 
-/// A motion known from readings: one step over a pause and many empty rows say the same.
+/// After a motion known from readings, one step over a pause and many empty rows give the same result.
 #[test]
 fn one_step_is_many_empty_rows() {
     let model = sensor(Moves::Ou);
@@ -155,8 +156,8 @@ fn one_step_is_many_empty_rows() {
     }
 }
 
-/// The same of hypotheses, with holds and without. Cut at every row, they came to 0.064 after 60 s by rows of 4 ms and to 0.150
-/// in one step; after 1 s in two steps they were up to 1.47 times as wide as by rows of 4 ms.
+/// The same for hypotheses, with and without holds. With truncation at every row, they spread to 0.064 after 60 s in rows of 4
+/// ms, and to 0.150 in one step; after 1 s in two steps they were up to 1.47 times as wide as in rows of 4 ms.
 #[test]
 fn one_step_is_many_empty_rows_for_hypotheses_too() {
     for moves in [Moves::Ou, Moves::OuAndHolds] {
@@ -189,10 +190,10 @@ fn one_step_is_many_empty_rows_for_hypotheses_too() {
     }
 }
 
-/// After a second without a reading, taken as one step, strain and branches are stated as wide as motions make them that begin
-/// where the pause begins, and are where those are. Of 4000 motions a deviation is off by four standard errors, 4/√8000 = 4.5 %,
-/// at most, and a mean by 4/√4000 = 0.06 deviations. One step and many rows may differ by 0.15 and 0.1; so may one step and the
-/// truth, besides. In two steps the branches were stated 1.19 to 1.40 times as wide.
+/// After a second without a reading, taken as one step, means and standard deviations of strain and branches agree with
+/// simulated motions from the start of the pause. With 4000 motions, a standard deviation is off by at most four standard
+/// errors, 4/√8000 = 4.5 %, and a mean by 4/√4000 = 0.06 standard deviations. One step and many rows may differ by 0.15 and 0.1;
+/// in addition, so may one step and the truth. In two steps, the stated width of the branches was 1.19 to 1.40 times as large.
 #[test]
 fn after_a_short_pause_hypotheses_are_as_wide_as_motions_make_them() {
     for moves in [Moves::Ou, Moves::OuAndHolds] {
@@ -216,8 +217,8 @@ fn after_a_short_pause_hypotheses_are_as_wide_as_motions_make_them() {
     }
 }
 
-/// A body's motion during a pause is as likely one way as the other, and carries no information on the motion before: a
-/// smoother returns to the beginning of the pause with the knowledge there, except for the blur of merged hypotheses (5 %).
+/// A body's motion during a pause is equally likely in both directions, and carries no information on the motion before: at
+/// the beginning of the pause, the smoothed state is the filtered one, except for the blur of merged hypotheses (5 %).
 #[test]
 fn a_pause_forgets_the_direction_and_a_smoother_comes_back_through_it() {
     let model = sensor(Moves::Ou);
@@ -232,7 +233,7 @@ fn a_pause_forgets_the_direction_and_a_smoother_comes_back_through_it() {
         states.push(split.advance(states.last().unwrap(), &prepared, None).unwrap().state);
     }
     let [extend, _, retract] = states[200].phase_probabilities();
-    // After 10 s, more than six times the rate's memory.
+    // After 10 s, more than six correlation times of the rate.
     assert!((extend - retract).abs() < 0.05 && (extend + retract - 1.0).abs() < 1e-12, "{extend} {retract}");
     let back = states[..200]
         .iter()
@@ -250,9 +251,9 @@ fn a_pause_forgets_the_direction_and_a_smoother_comes_back_through_it() {
     }
 }
 
-/// Before, the linearised switch dropped its variance, and took the rate of the step's end for that of the step: coverage fell to
-/// 3 % at 0.2 s, and errors were those beside the steps here (the same recordings); sign-split's at 0.2 and 0.5 s are between
-/// those with steps of a twelfth of the rate's time and those with a third, 0.0055 and 0.0119.
+/// Earlier, the linearised switch dropped its variance, and used the rate at the step's end for the whole step. Coverage fell to
+/// 3 % at 0.2 s, and errors were those listed with the steps here (same recordings). For sign-split at 0.2 and 0.5 s, the listed
+/// errors lie between those with steps of a twelfth and of a third of the rate's correlation time, 0.0055 and 0.0119.
 #[test]
 fn intervals_hold_on_the_own_law_at_any_rate_and_errors_are_smaller_than_they_were() {
     let check = |name: &str, dt_s: f64, range: (f64, f64), before: f64, found: Honesty| {
@@ -273,8 +274,9 @@ fn intervals_hold_on_the_own_law_at_any_rate_and_errors_are_smaller_than_they_we
         check("ekf", dt_s, one, ekf_before, honesty(Ekf::new(model), &start, scenario, 0..16));
         let split = SignSplit::<_, 2, 5, 8>::new(model, 0.0, None, EVIDENCE).unwrap();
         let mixture = Mixture::single(start, Phase::Extend);
-        // Named exception: at 0.5 s, in four steps, 99.6 % are covered. Errors are less than half of what they were in one step
-        // (0.0119, 98.6 % covered), but intervals 1.3 times as wide as these: ways there and back that end alike are merged.
+        // Named exception: at 0.5 s, in four steps, 99.6 % are covered. Errors are less than half of those in one step (0.0119,
+        // 98.6 % covered), but intervals are 1.3 times as wide as the errors: paths there and back with the same end are
+        // merged.
         let range = if dt_s < 0.5 { several } else { (90.0, 99.7) };
         check("sign-split", dt_s, range, split_before, honesty(split, &mixture, scenario, 0..16));
         check("sign-split", dt_s, several, f64::INFINITY, honesty(split, &mixture, (Moves::Ou, dt_s, true), 0..16));

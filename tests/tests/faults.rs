@@ -1,4 +1,4 @@
-//! Response of the default to faults: rows of `docs/faults.md`, and limits that hold whatever the table says.
+//! Response of the default estimator to faults: rows of `docs/faults.md`, and limits independent of the table.
 
 use ohmstrain::{EstimatorKind, Sensor};
 use ohmstrain_tests::sweep::{CASES, Case, SENSOR, answer_to, of_library, recordings, row};
@@ -7,7 +7,7 @@ fn case(name: &str) -> &'static Case {
     CASES.iter().find(|case| case.name == name).unwrap()
 }
 
-/// Some of its rows, made again. `scripts/faults.sh > docs/faults.md` makes all.
+/// Regenerates some of the table's rows; `scripts/faults.sh > docs/faults.md` generates all.
 #[test]
 fn the_document_says_what_the_filter_does() {
     let (sensor, traces) = (Sensor::from_toml(SENSOR).unwrap(), recordings().unwrap());
@@ -22,9 +22,9 @@ fn the_document_says_what_the_filter_does() {
     }
 }
 
-/// One recording, six onsets. With readings taken whole (`Influence::Full`) a spike of 1.3 is back within five seconds in five of
-/// six, and five per cent of them in three; both end an error that is twice as large as before. Whether an error is back hangs on
-/// single hypotheses: of all twelve onsets of the four faults it is in 95 %.
+/// One recording, six onsets. With the full influence of readings (`Influence::Full`), the filter recovers within five seconds
+/// from a single spike in five of six cases, and from spikes in 5 % of the rows in three. In both cases the error ends twice as
+/// large as before. Recovery depends on single hypotheses; over all twelve onsets of the four faults it occurs in 95 %.
 #[test]
 fn a_fault_that_ends_is_over() {
     let (sensor, traces) = (Sensor::from_toml(SENSOR).unwrap(), recordings().unwrap());
@@ -40,7 +40,7 @@ fn a_fault_that_ends_is_over() {
     assert!(recovered.iter().sum::<f64>() >= 95.0 * names.len() as f64, "{recovered:?}");
 }
 
-/// A filter that stays where a fault has led it is back within five seconds in 75 % of these cases, and in less.
+/// Without a second look, the filter recovers within five seconds in at most 75 % of these cases.
 #[test]
 fn a_filter_that_was_led_astray_looks_again() {
     let (sensor, traces) = (Sensor::from_toml(SENSOR).unwrap(), recordings().unwrap());
@@ -51,7 +51,7 @@ fn a_filter_that_was_led_astray_looks_again() {
     }
 }
 
-/// A filter flags nearly all of its wrong rows. Without doubts 85 and 69 % of the rows are wrong without a flag.
+/// The filter flags nearly all of its wrong rows. Without doubts 85 and 69 % of the rows are wrong without a flag.
 #[test]
 fn what_cannot_be_helped_is_said() {
     let (sensor, traces) = (Sensor::from_toml(SENSOR).unwrap(), recordings().unwrap());

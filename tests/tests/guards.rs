@@ -1,4 +1,4 @@
-//! Outliers, on any estimator: checked against the plain filter run differently.
+//! Outliers with any estimator, compared with the plain filter.
 
 use ohmstrain_ekf::{
     Belief, Dwell, Ekf, Estimator, Evidence, Guard, Guarded, Influence, Mixture, Reading, ReadingVerdict, SignSplit,
@@ -24,7 +24,7 @@ fn sign_split() -> SignSplit<f64, 1, 4, 4> {
     SignSplit::new(sensor(), DT_S, Some(Dwell::new(2.0, 3.0, 0.5).unwrap()), evidence).unwrap()
 }
 
-/// Runs a guard over readings; states and verdicts.
+/// Runs a guard over readings; returns states and verdicts.
 fn guarded<E: Estimator<f64, 4, 10>>(
     guard: Guard<f64>,
     estimator: &E,
@@ -61,8 +61,9 @@ fn a_rejected_reading_is_a_missing_one() {
     check_spike(&sign_split(), Mixture::single(start(), Phase::Extend));
 }
 
-/// After 3 s at one level the readings jump by far more than the state allows: a connector was moved, say. Rejected for
-/// ever without patience; with it the state follows once it is the state that is doubted.
+/// After 3 s at one level the readings jump by far more than the state allows: a connector was moved, for example.
+/// Without patience the readings are rejected for ever; with patience the state follows once the state itself is
+/// doubted.
 #[test]
 fn a_gate_cannot_lock_the_filter_out() {
     let jump = || (0..80).map(|k| Some(if k < 30 { 0.1 } else { 3.0 }));
@@ -77,8 +78,8 @@ fn a_gate_cannot_lock_the_filter_out() {
     assert!((predicted(&recovered).value - 3.0).abs() < 0.1);
 }
 
-/// A readmission inflates the state's covariance by as much as the reading is beyond the gate, ten times at most, and three
-/// times in a row at most.
+/// A readmission inflates the state's covariance by the factor by which the reading exceeds the gate, at most tenfold, and
+/// at most three times in a row.
 #[test]
 fn readmission_takes_no_more_confidence_than_it_needs() {
     let (ekf, gate, patience) = (ekf(), 10.8, 5);
@@ -105,7 +106,7 @@ fn readmission_takes_no_more_confidence_than_it_needs() {
     }
 }
 
-/// Huber's ψ: beyond the threshold the state moves as far as at the threshold.
+/// Huber's ψ: beyond the threshold, the state moves as far as at the threshold.
 #[test]
 fn huber_bounds_the_influence() {
     let ekf = ekf();
@@ -128,19 +129,20 @@ fn huber_bounds_the_influence() {
         let full = step(expected + 1.9 * sd, Influence::Full);
         (ReadingVerdict::Accepted, full.advanced.state)
     });
-    // A threshold below one deviation bounds from there on, too.
+    // A threshold below one standard deviation bounds from there on, too.
     let small = step(expected + 0.7 * sd, Influence::Huber { threshold: 0.5 });
     let half = step(expected + 0.5 * sd, Influence::Full);
     assert_eq!(small.verdict, ReadingVerdict::Downweighted);
     assert!((small.advanced.state.mean - half.advanced.state.mean).amax() <= 1e-12 * half.advanced.state.mean.amax());
-    // Redescending from three deviations on: weight 9/16 at four, 9/2500 at fifty, full weight at 2.9.
+    // Redescending from three standard deviations: weight 9/16 at four, 9/2500 at fifty, full weight at 2.9.
     let redescending = Influence::Redescending { threshold: 3.0 };
     let gain = at_threshold / (2.0 * sd);
     for (deviations, weight) in [(2.9, 1.0), (4.0, 9.0 / 16.0), (50.0, 9.0 / 2500.0)] {
         let moved = step(expected + deviations * sd, redescending).advanced.state.mean - missing.mean;
         assert!((moved - gain * (weight * deviations * sd)).amax() < 1e-12, "{deviations}");
     }
-    // Student's t with ν = 4: weight 5 / (4 + 16) at four deviations, 5 / (4 + 2500) at fifty, and full weight at one.
+    // Student's t with ν = 4: weight 5 / (4 + 16) at four standard deviations, 5 / (4 + 2500) at fifty, and full weight
+    // at one.
     let student = Influence::StudentT { degrees_of_freedom: 4.0 };
     for (deviations, weight) in [(1.0, 1.0), (4.0, 0.25), (50.0, 5.0 / 2504.0)] {
         let moved = step(expected + deviations * sd, student).advanced.state.mean - missing.mean;

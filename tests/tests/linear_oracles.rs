@@ -1,13 +1,13 @@
-//! Oracles on linear models, with irregular steps and missing samples: filter and smoother must agree at every row with two other
-//! formulations, the joint Gaussian of all states and readings written out densely, and the Modified
-//! Bryson-Frazier smoother, which inverts no covariance. Exactly known states make the smoother's priors singular.
+//! Oracles on linear models, with irregular steps and missing readings: filter and smoother must agree at every row with two
+//! other formulations: the dense joint Gaussian of all states and readings, and the modified Bryson-Frazier smoother, which
+//! inverts no covariance. Exactly known states make the smoother's priors singular.
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 use ohmstrain_ekf::{Belief, Channel, Dynamics, Ekf, Reading, Step};
 use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, Phase, SensorLaw, StrainRange, SwitchedModel, Symmetric};
 use ohmstrain_tests::{Draws, Flow, KnownPhase, Linear, rts_smooth};
 
-/// A row as the oracles know it: `x' = F x + push + n`, `y = H x + offset + w`.
+/// A row in the form used by the oracles: `x' = F x + push + n`, `y = H x + offset + w`.
 struct Row<const N: usize> {
     transition: SMatrix<f64, N, N>,
     push: SVector<f64, N>,
@@ -19,7 +19,7 @@ struct Row<const N: usize> {
 }
 
 impl<const N: usize> Row<N> {
-    /// Reads the row of a linear model over `dt_s` off at the origin.
+    /// Extracts the row of a linear model over `dt_s` by evaluating it at the origin.
     fn of<const L: usize>(
         model: &(impl Dynamics<f64, N, L> + Channel<f64, N, L>),
         dt_s: f64,
@@ -41,11 +41,11 @@ impl<const N: usize> Row<N> {
     }
 }
 
-/// Means and covariances at all rows given all readings.
+/// Smoothed means and covariances at all rows.
 type Smoothed<const N: usize> = Vec<(SVector<f64, N>, SMatrix<f64, N, N>)>;
 
-/// From one Gaussian of all states. Besides: the standard deviations before any reading, and the log density of the
-/// readings.
+/// Conditions one Gaussian of all states. Returns the smoothed rows, the standard deviations before any reading, and
+/// the log density of the readings.
 fn dense<const N: usize>(
     start: (SVector<f64, N>, SMatrix<f64, N, N>),
     rows: &[Row<N>],
@@ -89,7 +89,7 @@ fn dense<const N: usize>(
     (smoothed.collect(), sd.collect(), log_density)
 }
 
-/// Modified Bryson-Frazier: a Kalman filter forwards, and an adjoint λ with its matrix Λ backwards.
+/// Runs the modified Bryson-Frazier smoother: a Kalman filter forwards, and an adjoint λ with its matrix Λ backwards.
 ///
 /// Source: Bierman, *Int. J. Control* 18 (1973) 1227.
 #[allow(non_snake_case, reason = "the letters of the source")]
@@ -124,7 +124,7 @@ fn bryson_frazier<const N: usize>(start: (SVector<f64, N>, SMatrix<f64, N, N>), 
     smoothed
 }
 
-/// Steps in seconds: short, long, and none at all.
+/// Steps in seconds: short, long, and zero.
 const STEPS_S: [f64; 9] = [0.05, 0.3, 0.0, 1.7, 0.001, 0.12, 0.7, 4.0, 0.02];
 const ROWS: usize = 31;
 /// The covariance of the readings has condition numbers below 1e4 here, and 31 rows of rounded products leave
@@ -194,8 +194,8 @@ fn random_models_equal_both_oracles_at_every_row() {
     check_flow::<6, 21>(6);
 }
 
-/// A linear sensor whose branches wander by `branch_sd` around their law, and whose baseline, if it has one, never
-/// leaves zero.
+/// Returns a linear sensor whose branches wander by `branch_sd` around their law, and whose baseline, if it has one, is
+/// always zero.
 fn linear_sensor<const B: usize, const N: usize>(motion: Motion<f64>, branch_sd: f64) -> SwitchedModel<f64, B, N> {
     let branch = |i: usize| Branch {
         tau_s: 4.0 * 8_f64.powi(i as i32),
@@ -215,7 +215,7 @@ fn linear_sensor<const B: usize, const N: usize>(motion: Motion<f64>, branch_sd:
     SwitchedModel::new(law, motion, noise).unwrap()
 }
 
-/// Stretches, rests, releases and rests again; in a rest the rate is exactly zero.
+/// Checks a body that stretches, rests, releases and rests again; in a rest the rate is exactly zero.
 fn check_sensor<const B: usize, const N: usize, const L: usize>(
     what: &str,
     tolerance: f64,
@@ -235,7 +235,7 @@ fn rough() -> Motion<f64> {
     Motion::ornstein_uhlenbeck(1.5, 0.05, 0.15, 0.1).unwrap()
 }
 
-/// Rests and a baseline that is exactly zero make priors singular.
+/// Rests, and a baseline of exactly zero, make priors singular.
 #[test]
 fn the_sensor_equals_both_oracles_at_every_row() {
     check_sensor::<0, 2, 3>("no branch", ROUNDING, linear_sensor(rough(), 0.0));
@@ -243,9 +243,9 @@ fn the_sensor_equals_both_oracles_at_every_row() {
     check_sensor::<2, 5, 15>("two branches", ROUNDING, linear_sensor(rough(), 0.01));
 }
 
-/// All states driven by one noise: after a short step from a known state they are nearly one number, and the smoother's
-/// gain, which the Bryson-Frazier smoother does without, is as badly conditioned as it can be. The smoother promises
-/// N² ε^⅓ then.
+/// All states are driven by one noise. After a short step from a known state they are almost completely correlated, and
+/// the smoother's gain, which the Bryson-Frazier smoother does not need, has the worst possible condition. The stated
+/// error is then N² ε^⅓.
 #[test]
 fn branches_without_noise_of_their_own_stay_within_the_promise() {
     let promise = |n: f64| n * n * f64::EPSILON.cbrt();
@@ -253,7 +253,7 @@ fn branches_without_noise_of_their_own_stay_within_the_promise() {
     check_sensor::<2, 5, 15>("two branches", promise(5.0), linear_sensor(rough(), 0.0));
 }
 
-/// A state that is known exactly and never changes, but drives another one.
+/// An exactly known, constant state that drives another one.
 #[test]
 fn a_constant_stays_what_it_is() {
     let model = Linear {

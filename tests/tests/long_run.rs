@@ -6,13 +6,13 @@ use ohmstrain_ekf::{Belief, Dynamics, Ekf, Reading, seconds_between};
 use ohmstrain_model::{Phase, SwitchedModel};
 use ohmstrain_tests::{Draws, sensor};
 
-/// The smallest eigenvalue of the correlation matrix: what is left where everything known is taken out.
+/// Returns the smallest eigenvalue of the correlation matrix.
 fn smallest_correlation_eigenvalue<const N: usize, const L: usize>(belief: &Belief<f32, N, L>) -> f64 {
     let p = belief.covariance.to_matrix().map(f64::from);
     nalgebra::DMatrix::from_fn(N, N, |i, j| p[(i, j)] / (p[(i, i)] * p[(j, j)]).sqrt()).symmetric_eigenvalues().min()
 }
 
-/// A day of a sensor read at a hundred hertz, and more.
+/// More than a day of a sensor read at 100 Hz.
 #[test]
 fn ten_million_steps_keep_the_covariance_positive_semi_definite() {
     const STEPS: u32 = 10_000_000;
@@ -31,7 +31,7 @@ fn ten_million_steps_keep_the_covariance_positive_semi_definite() {
         let reading = (k % 7 != 0).then(|| Reading::from(1.6 * strain - 1.2 * strain * strain + jitter));
         belief = ekf.step_prepared(&belief, &prepared, reading).unwrap().posterior;
         if k % 1000 == 0 {
-            // Rounding of the entries alone moves an eigenvalue by up to 5 · 6e-8.
+            // Rounding of the entries alone changes an eigenvalue by up to 5 · 6e-8.
             let smallest = smallest_correlation_eigenvalue(&belief);
             assert!(smallest > -3e-7, "step {k}: {smallest}");
         }
@@ -45,17 +45,17 @@ type State<T> = Belief<T, 4, 10>;
 const DAY_US: u64 = 86_400_000_000;
 const MILLISECOND_US: u64 = 1_000;
 const BETWEEN_BURSTS_US: u64 = 250_000;
-/// A burst now and then, of a second.
+/// Interval between bursts, and length of half a burst, µs.
 const EVERY_US: u64 = 900_000_000;
 const BURST_US: u64 = 1_000_000;
-/// A 32-bit count of microseconds starts again.
+/// Time after which a 32-bit count of microseconds wraps.
 const WRAP_US: u64 = 1 << 32;
 
-/// Largest difference between the strains of f32 and f64. A step rounds a strain below 0.35, to 2⁻²⁶ at worst, some ten times on
-/// its way through prediction and update, with either sign; and its innovation four times as the difference of sums below
-/// one, to 2⁻²⁵ at worst, of which the gain takes half, the gauge's slope being two. Thirty seconds, the memory of the
-/// baseline, hold two thousand steps of a burst and a hundred others, so that the roundings that are remembered add up to
-/// √(2100 · 14) · 2⁻²⁶ = 2.6e-6; five times that is never reached by chance.
+/// Largest difference between the strains of f32 and f64. A step rounds a strain below 0.35, by at most 2⁻²⁶, about ten times in
+/// prediction and update, with either sign. It rounds the innovation, a difference of sums below one, four times by at most
+/// 2⁻²⁵, of which the gain takes half, because the gauge's slope is two. Thirty seconds, the correlation time of the baseline,
+/// contain two thousand steps of a burst and a hundred others, so that the remembered roundings add up to √(2100 · 14) · 2⁻²⁶ =
+/// 2.6e-6. Chance never reaches five times that.
 const APART: f64 = 1.28e-5;
 
 /// True if the sensor is read every millisecond: in the second before and after every quarter of an hour and every wrap.
@@ -66,7 +66,7 @@ fn in_burst(time_us: u64) -> bool {
     })
 }
 
-/// The instants of the readings: a thousand a second in bursts, four otherwise, none of them on time.
+/// Returns the times of the readings, µs: a thousand per second in bursts, four otherwise, all with jitter.
 fn instants() -> impl Iterator<Item = u64> {
     let mut jitter = Draws::new(7);
     let mut time_us = 0;
@@ -77,7 +77,7 @@ fn instants() -> impl Iterator<Item = u64> {
     })
 }
 
-/// Strain and its rate, 1/s: up to 30 % in five seconds, held, back in five, held.
+/// Returns the strain and its rate, 1/s: up to 30 % in five seconds, hold, back in five, hold.
 fn movement(time_us: u64) -> (f64, f64) {
     let time_s = (time_us % 20_000_000) as f64 * 1e-6;
     match time_s {
@@ -88,7 +88,7 @@ fn movement(time_us: u64) -> (f64, f64) {
     }
 }
 
-/// The sensor that the filters assume, read with its noise. Steps are short against the branch's time constant.
+/// The sensor that the filters assume, read with its noise. Steps are short compared with the branch's time constant.
 struct Sensor {
     model: Model<f64>,
     branch: f64,
@@ -124,7 +124,7 @@ struct Day {
     smallest_eigenvalue: f64,
 }
 
-/// Steps both filters through a day. `seconds` says how long a step of the filter in f32 is.
+/// Steps both filters through a day. `seconds` returns the length of a step for the filter in f32.
 fn day(seconds: impl Fn(Range<u64>) -> f32) -> Day {
     let (single, double) = (Ekf::new(sensor::<f32, 1, 4>()), Ekf::new(sensor::<f64, 1, 4>()));
     let (mut state32, mut state64): (State<f32>, State<f64>) =
@@ -157,22 +157,23 @@ fn day(seconds: impl Fn(Range<u64>) -> f32) -> Day {
     out
 }
 
-/// All 86.4 million steps would take minutes. What a day can break is the clock, which bursts of millisecond steps show
-/// wherever in the day they stand, and rounding that adds up, for which half a million steps are enough: the slowest
-/// thing that the filter remembers, the baseline, forgets within thirty seconds.
+/// All 86.4 million steps would take minutes. A day can reveal errors of the clock, which bursts of millisecond steps
+/// show at any time of the day, and accumulated rounding, for which half a million steps are enough: even the baseline,
+/// the slowest state, forgets within thirty seconds.
 #[test]
 fn a_day_of_milliseconds_in_f32_is_that_in_f64() {
     let day = day(|step| seconds_between(step.start as u32, step.end as u32));
     assert_eq!(day.wraps, 20);
     assert!(day.in_bursts > 200_000, "{}", day.in_bursts);
     assert!(day.apart < APART, "{:e}", day.apart);
-    // Rounding of the entries alone moves an eigenvalue by up to 4 · 6e-8.
+    // Rounding of the entries alone changes an eigenvalue by up to 4 · 6e-8.
     assert!(day.smallest_eigenvalue > -2.4e-7, "{:e}", day.smallest_eigenvalue);
-    // Agreement would be cheap if both were lost: in the last burst the strain is known to a few of its deviations.
+    // Agreement would mean little if both had diverged: in the last burst, the error of the strain is a few standard
+    // deviations.
     assert!(day.off_sd < 4.0, "{}", day.off_sd);
 }
 
-/// The same day with the mistake that `seconds_between` is there to prevent.
+/// The same day with the mistake that `seconds_between` prevents.
 #[test]
 fn a_clock_of_f32_seconds_is_off() {
     let clock_s = |time_us: u64| (time_us as f64 * 1e-6) as f32;

@@ -1,4 +1,4 @@
-//! Tests that need more than one crate. One test program; a module for each subject.
+//! Tests that need more than one crate. One test program, with a module for each subject.
 
 mod adskalman_bridge;
 mod adskalman_vectors;

@@ -1,5 +1,5 @@
-//! Smoothing over hypotheses about the phase. As long as no two hypotheses are merged the smoother is exact: it must give
-//! what conditioning every possible phase history on all readings gives, one dense Gaussian each.
+//! Smoothing over hypotheses about the phase. While no hypotheses are merged, the smoother is exact: it must agree with
+//! conditioning every possible phase history on all readings, one dense Gaussian each.
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 use ohmstrain_ekf::{
@@ -23,16 +23,17 @@ struct Scenario {
     reading_sd: f64,
 }
 
-/// Steps whose displacements add up to another sum for every history, so that none is merged with another one, and
-/// readings that make none negligible.
+/// Steps whose displacements have a different sum for every history, so that none are merged, and readings that make
+/// none negligible.
 const APART: Scenario = Scenario { dt_s: [0.9, 2.7, 8.1, 0.3], rate_sd: 1e-3, reading_sd: 3.0 };
-/// Steps as a filter takes them, and readings that tell something.
+/// Equal steps as in a filter, and informative readings.
 const EVEN: Scenario = Scenario { dt_s: [0.4; STEPS], rate_sd: 0.05, reading_sd: 0.02 };
 
 const ANYWHERE: Evidence<f64> =
     Evidence { limits: StrainRange { lower: f64::NEG_INFINITY, upper: f64::INFINITY }, tempering: 1.0 };
 
-/// Linear given the phases: constant gains, a straight gauge. Phases move at well-defined speeds.
+/// Returns a model that is linear given the phases: constant gains, a straight gauge. Phases move at well-defined
+/// speeds.
 fn model(&Scenario { rate_sd, reading_sd, .. }: &Scenario) -> Model {
     let law = SensorLaw {
         gauge: Gauge::Polynomial { coefficients: [1.5, 0.0, 0.0] },
@@ -63,7 +64,7 @@ fn start() -> Belief<f64, N, L> {
 /// The second one is missing.
 const READINGS: [Option<f64>; STEPS] = [Some(0.31), None, Some(0.52), Some(0.35)];
 
-/// One history's dense Gaussian over the states at times 0…STEPS, conditioned on all readings.
+/// Dense Gaussian of one history over the states at times 0…STEPS, conditioned on all readings.
 struct Dense {
     log_weight: f64,
     mean: DVector<f64>,
@@ -82,7 +83,8 @@ fn dense(phases: &[Phase], scenario: &Scenario) -> Dense {
         let step = model.prepare(dt_s[k]);
         log_weight += dwell().probabilities(dt_s[k])[before.index()][phase.index()].ln();
         let at: SVector<f64, N> = mean.fixed_rows::<N>(N * k).into_owned();
-        // When a movement begins its rate is redrawn: no column of the rate, a constant and a variance instead.
+        // When a movement begins, its rate is redrawn: the column of the rate is zero, with a constant and a variance
+        // instead.
         let mut keep = SMatrix::<f64, N, N>::identity();
         let mut redrawn = SVector::<f64, N>::zeros();
         let mut spread = SMatrix::<f64, N, N>::zeros();
@@ -126,7 +128,7 @@ fn dense(phases: &[Phase], scenario: &Scenario) -> Dense {
     Dense { log_weight, mean, covariance }
 }
 
-/// Mean, covariance and phase probabilities at time k (0 is the start) over all histories.
+/// Returns mean, covariance and phase probabilities at time k (0 is the start) over all histories.
 fn enumerated(scenario: &Scenario, k: usize) -> (SVector<f64, N>, SMatrix<f64, N, N>, [f64; 3]) {
     let histories: Vec<(Vec<Phase>, Dense)> = (0..HISTORIES)
         .map(|number| (0..STEPS).map(|k| Phase::ALL[number / 3_usize.pow(k as u32) % 3]).collect())
@@ -145,7 +147,7 @@ fn enumerated(scenario: &Scenario, k: usize) -> (SVector<f64, N>, SMatrix<f64, N
     (mean, second - mean * mean.transpose(), phase_probabilities)
 }
 
-/// Filters, then goes back; the states at times 0…STEPS given all readings.
+/// Filters, then smooths; returns the smoothed states at times 0…STEPS.
 fn smoothed<E: Estimator<f64, N, L>>(estimator: &E, scenario: &Scenario, start: E::State) -> Vec<E::State> {
     let (mut state, mut steps) = (start, Vec::new());
     for (reading, dt_s) in READINGS.into_iter().zip(scenario.dt_s) {
@@ -171,8 +173,8 @@ fn without_merging_it_is_the_sum_over_all_histories() {
     for (k, state) in states.iter().enumerate() {
         let (mean, covariance, phases) = enumerated(&APART, k);
         let moments = state.moments();
-        // About 81 · 20 operations on numbers below one, amplified by the condition of a dense innovation covariance
-        // (below 10): 1e-12 leaves two digits.
+        // About 81 · 20 operations on numbers below one, amplified by the condition number of a dense innovation
+        // covariance (below 10): 1e-12 leaves two digits.
         assert!((moments.mean - mean).amax() < 1e-12, "time {k}");
         assert!((moments.covariance.to_matrix() - covariance).amax() < 1e-12, "time {k}");
         for (found, expected) in state.phase_probabilities().iter().zip(phases) {
@@ -181,8 +183,8 @@ fn without_merging_it_is_the_sum_over_all_histories() {
     }
 }
 
-/// Interacting multiple models mix before every step, which is an approximation; what is known of the past must come
-/// nearer to the truth by going back all the same.
+/// Interacting multiple models mix before every step, which is an approximation; smoothing must still reduce the error
+/// of past states.
 #[test]
 fn the_imm_smoother_comes_nearer_than_its_filter() {
     let imm = Imm::<f64, 1, N>::new(model(&EVEN), 0.0, dwell(), ANYWHERE).unwrap();
@@ -238,7 +240,7 @@ fn check_one_phase<E: Estimator<f64, N, L>>(estimator: &E, from: E::State, phase
     assert_eq!(row, 0);
 }
 
-/// A phase that lasts for ever: what else might begin has no weight that counts.
+/// A phase that lasts for ever: other phases have negligible weight.
 #[test]
 fn in_one_phase_it_is_rauch_tung_striebel() {
     let (model, dwell) = (model(&EVEN), Dwell::new(1e200, 1e200, 0.0).unwrap());
@@ -250,8 +252,8 @@ fn in_one_phase_it_is_rauch_tung_striebel() {
     }
 }
 
-/// Filters readings of a wave with a gap of half a minute, goes back, and returns the largest standard deviation of any state,
-/// over the largest one that the filter stated.
+/// Filters and smooths readings of a wave with a gap of half a minute, and returns the largest smoothed standard deviation of
+/// any state, divided by the largest filtered one.
 fn widest_after_smoothing<E: Estimator<f64, N, L>>(
     estimator: &E,
     from: E::State,
@@ -276,9 +278,9 @@ fn widest_after_smoothing<E: Estimator<f64, N, L>>(
     smoothed.component_div(&filtered).max()
 }
 
-/// A gap leaves a smoother no less certain than its filter, except for the distances between the means of histories. In a gap there
-/// is no information on what decays, and an excess of variance, as approximate merging leaves, would grow e-fold in each time
-/// constant on the way back: 30 of them here.
+/// In a gap, a smoother is no less certain than its filter, except for the distances between the means of histories. A gap carries
+/// no information on decaying states, and an excess of variance from approximate merging would grow e-fold per time constant in the
+/// backward pass; the gap has 30 time constants.
 #[test]
 fn a_gap_does_not_lead_a_smoother_astray() {
     let imm = Imm::<f64, 1, N>::new(model(&EVEN), 0.0, dwell(), ANYWHERE).unwrap();

@@ -1,5 +1,5 @@
 //! Filters of phase hypotheses: the chain between phases is a Markov chain in continuous time; predictions have the
-//! moments of all phase histories; limits count once; stretching and releasing are told apart.
+//! moments of all phase histories; limits count once; stretching and releasing are distinguished.
 
 use nalgebra::{Matrix3, SVector};
 use ohmstrain_ekf::{
@@ -50,7 +50,7 @@ struct History {
     belief: Belief<f64, 3, 6>,
 }
 
-/// A moving phase begins: its rate is that of the phase, and depends on nothing.
+/// Returns the belief when a moving phase begins: its rate is that of the phase, independent of everything else.
 fn enter(from: &Belief<f64, 3, 6>, phase: Phase) -> Belief<f64, 3, 6> {
     let (mut entered, motion) = (*from, *switching_sensor().motion());
     for j in 0..3 {
@@ -61,7 +61,7 @@ fn enter(from: &Belief<f64, 3, 6>, phase: Phase) -> Belief<f64, 3, 6> {
     entered
 }
 
-/// All 3ⁿ histories of n steps.
+/// Returns all 3ⁿ histories of n steps.
 fn every_history(dwell: Dwell<f64>, start: History, steps: usize) -> Vec<History> {
     let model = switching_sensor();
     let chain = dwell.probabilities(DT_S);
@@ -88,9 +88,9 @@ fn every_history(dwell: Dwell<f64>, start: History, steps: usize) -> Vec<History
     histories
 }
 
-/// Checks that without readings mixing and merging lose nothing of the first two moments: the sum over all histories is the same.
-/// No change of phase is less likely than 0.07 here, so no history is as light as 0.07⁴ = 2.4e-5, and none is dropped as
-/// negligible, which begins at e⁻¹² = 6e-6.
+/// Checks that mixing and merging without readings preserve the first two moments of the sum over all histories. Every change of
+/// phase has a probability of at least 0.07 here, so no history is lighter than 0.07⁴ = 2.4e-5, and none is dropped as
+/// negligible, below e⁻¹² = 6e-6.
 fn check_prediction<E: Estimator<f64, 3, 6>>(
     filter: &E,
     from: E::State,
@@ -111,7 +111,7 @@ fn check_prediction<E: Estimator<f64, 3, 6>>(
             .map(|h| (h.belief.covariance.to_matrix() + h.belief.mean * h.belief.mean.transpose()) * h.probability)
             .sum();
         let moments = mixture.moments();
-        // Numbers of at most one, some 3⁴ sums.
+        // Numbers up to one, about 3⁴ sums.
         prop_assert!((moments.mean - mean).amax() < 1e-13);
         prop_assert!((moments.covariance.to_matrix() - (second - mean * mean.transpose())).amax() < 1e-13);
     }
@@ -134,7 +134,7 @@ proptest! {
     }
 }
 
-/// A body at rest on a limit: the evidence of the limit counts once, not at each of a thousand steps.
+/// A body at rest at a limit: the evidence of the limit counts once, not at each of a thousand steps.
 #[test]
 fn a_thousand_steps_at_rest_on_a_limit_change_nothing() {
     let evidence = within(0.0, 0.3);
@@ -152,7 +152,7 @@ fn a_thousand_steps_at_rest_on_a_limit_change_nothing() {
     assert!((last.covariance[(0, 0)] / first.covariance[(0, 0)] - 1.0).abs() < 1e-3);
 }
 
-/// Stretching and releasing both raise R here. The sign-split filter, told nothing about direction, must know it.
+/// Stretching and releasing both raise R here. The sign-split filter must infer the direction.
 #[test]
 fn sign_split_tells_stretching_from_releasing() {
     let motion = Motion::ornstein_uhlenbeck(0.7, 0.1, 0.15, 0.12).unwrap();

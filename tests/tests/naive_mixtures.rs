@@ -1,4 +1,4 @@
-//! The filters of hypotheses, and their smoothers, compute what is written down naively.
+//! Filters of hypotheses and their smoothers, compared with naive implementations.
 
 mod naive;
 
@@ -15,7 +15,8 @@ use naive::{Naive, Rule, Said};
 const DT_S: f64 = 0.01;
 const STEPS: usize = 3000;
 
-/// A slow sine with holds, near the limits of [`evidence`], with noise of two frequencies, and a second and a half without readings.
+/// Returns a slow sine with holds, near the limits of [`evidence`], with noise of two frequencies, and a second and a half without
+/// readings.
 fn reading<T: Real>(k: usize) -> Option<Reading<T>> {
     let t = k as f64;
     let slow = 0.22 + 0.24 * (t * 0.01).sin().clamp(-0.8, 0.8);
@@ -31,15 +32,14 @@ fn dwell<T: Real>() -> Dwell<T> {
     Dwell::new(T::of(5.0), T::of(1.0), T::of(0.3)).unwrap()
 }
 
-/// The sensor of all tests; with `phase_rate`, moving phases have a mean rate.
+/// Returns the sensor of all tests; with a nonzero `phase_rate`, moving phases have a mean rate.
 fn model<const B: usize, const N: usize>(phase_rate: f64) -> SwitchedModel<f64, B, N> {
     let model = sensor::<f64, B, N>();
     SwitchedModel::new(*model.law(), model.motion().with_phase_rate(phase_rate).unwrap(), *model.noise()).unwrap()
 }
 
-/// The largest differences of a run: of means in deviations of what was known before the step, of covariances relative to its
-/// diagonals, of probabilities, of the reading's innovation and logarithm of its density. And the most hypotheses that there
-/// were.
+/// Largest differences of a run: of means in prior standard deviations, of covariances relative to the prior's diagonal, of
+/// probabilities, and of the reading's innovation and log density. Also the largest number of hypotheses.
 #[derive(Debug, Default)]
 struct Apart {
     belief: f64,
@@ -80,10 +80,11 @@ impl Apart {
         }
     }
 
-    /// A step is some 50 operations deep: mixing, prediction, cut, update, merging, and a gain is up to some tens of times larger
-    /// than what it leaves: 3000 roundings. What one step rounds differently is remembered by later ones, no longer than the
-    /// run: no more than the sum of all. A hypothesis that counts lies within √24 deviations of the reading (e⁻¹² of the best
-    /// is dropped), so that half its NIS, and with it its weight, is uncertain by that times the uncertainty of its innovation.
+    /// A step is about 50 operations deep (mixing, prediction, truncation, update, merging), and an update subtracts terms up to
+    /// tens of times larger than the result: 3000 roundings. Later steps retain rounding differences at most for the run, so the
+    /// total is at most their sum. A hypothesis that counts lies within √24 standard deviations of the reading (below e⁻¹² of the
+    /// best it is dropped), so half its NIS, and with it its weight, is uncertain by that times the uncertainty of its
+    /// innovation.
     fn check(&self) {
         let rounding = STEPS as f64 * 3000.0 * f64::EPSILON;
         let weighed = 24_f64.sqrt() * rounding;
@@ -91,7 +92,7 @@ impl Apart {
     }
 }
 
-/// Both go their own ways from one belief.
+/// Runs both independently from the same belief.
 fn differences<E, const B: usize, const N: usize, const L: usize>(
     filter: &E,
     start: E::State,
@@ -141,7 +142,7 @@ fn each<const N: usize, const L: usize, const K: usize>(
     state.shares().iter().zip(state.phases()).map(|(share, phase)| (share.weight, *phase, share.belief)).collect()
 }
 
-/// Creates a filter whose switch in a pause is the dense filter's, to rounding.
+/// Creates a filter whose switch in a pause equals the dense filter's, to rounding.
 fn signs<const B: usize, const N: usize, const K: usize>(
     model: SwitchedModel<f64, B, N>,
     dt_s: f64,
@@ -191,12 +192,13 @@ fn agree_with_naive_filters_to_rounding() {
     assert_eq!(sixteen.hypotheses, 16);
 }
 
-/// Steps of the smoothers' runs, s, and how many.
+/// Step length of the smoothers' runs, s; the constant below is the number of steps.
 const SLOW_DT_S: f64 = 0.1;
 const PAST: usize = 150;
 
-/// Filters and goes back, both with what the other one says of later steps; the most hypotheses that one went back to, and the
-/// largest differences: of means in filtered deviations, of covariances relative to filtered variances, of probabilities.
+/// Filters and smooths, both from the same smoothed states of later steps. Returns the largest number of smoothed hypotheses,
+/// and the largest difference: of means in filtered standard deviations, of covariances relative to filtered variances, and of
+/// probabilities.
 fn smoothed_apart<E, const B: usize, const N: usize, const L: usize>(
     filter: &E,
     start: E::State,
@@ -230,7 +232,7 @@ where
         most = most.max(expected.len());
         for ((found, expected), filtered) in found.iter().zip(&expected).zip(&own[k].all) {
             larger(&mut apart, (found.0 - expected.0).abs());
-            // Of what has no weight nothing is said.
+            // Hypotheses with negligible weight are not compared.
             if expected.0 < 1e-6 {
                 continue;
             }
@@ -263,12 +265,13 @@ fn smoothers_agree_with_naive_ones() {
     let rule = Rule::Histories(dwell());
     let of_histories = smoothed_apart(&histories, Mixture::single(start, Phase::Hold), &naive(rule, 8), each);
     for (most, apart) in [of_imm, of_signs, with_holds, of_histories] {
-        // What is told by nearly equal correlations is rounded by their condition, below 1e7 after a tenth of a second.
+        // Rounding is amplified by the condition number of nearly singular correlations, below 1e7 after a tenth of a
+        // second.
         assert!(most >= 3 && apart < 1e7 * 10.0 * f64::EPSILON, "{most} {apart}");
     }
 }
 
-/// The runs above come near the limits: without them the filters would say something else.
+/// The runs above come near the limits: without limits the results would differ.
 #[test]
 fn the_limits_of_these_runs_count() {
     let model = sensor::<f64, 3, 6>();
@@ -309,7 +312,7 @@ fn a_marginal_is_that_of_the_whole_mixture() {
         [mean + mode.weight * strain, square + mode.weight * (variance + strain * strain)]
     });
     let (marginal, moments) = (state.marginal(0), state.moments());
-    // Strains of 0.1 with a variance of 1e-4: squares are a hundred times larger than what is left.
+    // Strains of 0.1 with a variance of 1e-4: squares are a hundred times larger than the difference.
     assert!((marginal.mean - of_strain).abs() < 10.0 * f64::EPSILON);
     assert!((marginal.variance - (of_square - of_strain * of_strain)).abs() < 10.0 * f64::EPSILON);
     assert!((marginal.variance / moments.covariance[(0, 0)] - 1.0).abs() < 100.0 * f64::EPSILON);
@@ -346,7 +349,7 @@ fn an_error_leaves_the_state() {
     assert!(SignSplit::<f64, 1, 3, 4>::new(model, f64::NAN, None, evidence(1.0)).is_err());
 }
 
-/// Filters in `f32`, without Joseph's form: readings are exact for long, and no step is refused.
+/// Filters in `f32`, without Joseph's form: readings are exact for a long time, and no step is refused.
 #[test]
 fn go_on_in_single_precision() {
     let model = sensor::<f32, 3, 6>();

@@ -1,8 +1,8 @@
-//! One Kalman filter on a linear model of one phase: the textbook's, adskalman's, and each of our estimators,
-//! whatever it would do elsewhere.
+//! On a linear model with one phase, the textbook's Kalman filter, adskalman's and each of our estimators are the same
+//! filter.
 //!
-//! The covariances here have condition numbers of at most some thousand and entries of order one, so that a dozen
-//! rounded products leave 1e-12 of a result; 1e-11 is asked for.
+//! The covariances here have condition numbers up to a few thousand and entries of order one, so that a dozen rounded
+//! products leave a relative error of 1e-12; the tolerance is 1e-11.
 
 use adskalman::{KalmanFilterNoControl, StateAndCovariance};
 use nalgebra::{Const, SMatrix, SVector};
@@ -14,7 +14,7 @@ const TOLERANCE: f64 = 1e-11;
 const ROWS: usize = 25;
 const DT_S: f64 = 0.1;
 
-/// A linear model around another state than zero.
+/// A linear model around a nonzero state.
 #[derive(Clone, Copy)]
 struct Around<const N: usize> {
     linear: Linear<f64, N>,
@@ -61,7 +61,7 @@ impl<const N: usize> Row<N> {
     }
 }
 
-/// Kalman's equations as every textbook has them, P - K S Kᵀ included.
+/// Returns the rows of Kalman's textbook equations, with P - K S Kᵀ.
 #[allow(non_snake_case, reason = "the letters of the textbook")]
 fn textbook<const N: usize>(
     model: &Around<N>,
@@ -89,7 +89,7 @@ fn textbook<const N: usize>(
     rows
 }
 
-/// A model, where it starts, and its readings.
+/// A model, its initial belief, and its readings.
 struct Case<const N: usize, const L: usize> {
     model: Around<N>,
     start: Belief<f64, N, L>,
@@ -131,7 +131,7 @@ fn check_filters_of_one_gaussian<const N: usize, const L: usize>(seed: u64) {
     check_adskalman(&case, &steps);
 }
 
-/// adskalman's filter and smoother through our bridge.
+/// Checks adskalman's filter and smoother, used through our bridge.
 fn check_adskalman<const N: usize, const L: usize>(case: &Case<N, L>, steps: &[Step<f64, N, L>]) {
     let origin = Belief { mean: SVector::zeros(), ..case.start };
     let transition: Transition<f64, N, L> = case.model.transition(&(), &origin, None);

@@ -1,5 +1,5 @@
-//! The particle filter on a linear model, moving or standing: the Kalman filter, but for chance that falls with the square
-//! root of the number of particles.
+//! The particle filter on a linear model, moving or standing, compared with the Kalman filter; the random difference falls
+//! with the square root of the number of particles.
 
 use nalgebra::{SMatrix, SVector};
 use ohmstrain_ekf::{Belief, Dwell, Evidence, Reading};
@@ -31,7 +31,7 @@ const NOISE: ModelNoise<f64> =
     ModelNoise { reading_sd: 5e-3, branch_sd: 5e-3, baseline_sd: 0.02, baseline_time_s: 30.0 };
 const DT_S: f64 = 0.1;
 
-/// Gains that do not depend on direction or strain: a linear Gaussian model, its strain about zero.
+/// Returns a linear Gaussian model: gains do not depend on direction or strain, and the mean strain is zero.
 fn linear() -> Model {
     let branch = |i: usize| Branch {
         tau_s: TAUS_S[i],
@@ -63,7 +63,7 @@ struct Kalman {
 }
 
 impl Kalman {
-    /// `moves` = false: a body that stands, its strain unknown.
+    /// Discretises the model; `moves` = false is a standing body with unknown strain.
     fn new(moves: bool) -> Self {
         let mut a = SMatrix::<f64, 5, 5>::zeros();
         let mut density = SMatrix::<f64, 5, 5>::zeros();
@@ -112,7 +112,7 @@ impl Kalman {
         self.log_likelihood -= 0.5 * (innovation * innovation / s + (std::f64::consts::TAU * s).ln());
     }
 
-    /// Readings that such a sensor gives, every seventh of them missing.
+    /// Simulates readings of such a sensor, every seventh one missing.
     fn simulate(&self, steps: usize, seed: u64) -> (SVector<f64, 5>, Vec<Option<f64>>) {
         let mut rng = ChaCha12Rng::seed_from_u64(seed);
         let mut draw = |covariance: &SMatrix<f64, 5, 5>| {
@@ -135,7 +135,7 @@ impl Kalman {
     }
 }
 
-/// Posterior and log-likelihood after all readings.
+/// Returns posterior and log-likelihood after all readings.
 fn run(filter: &Particles<f64, Model>, phase: Phase, readings: &[Option<f64>]) -> (Cloud, f64) {
     let prepared = filter.model().prepare(DT_S);
     let mut cloud: Cloud = filter.start(&Belief::initial(filter.model()), phase);
@@ -148,17 +148,17 @@ fn run(filter: &Particles<f64, Model>, phase: Phase, readings: &[Option<f64>]) -
     (cloud, log_likelihood)
 }
 
-/// Runs with other random numbers, of which averages and spreads are taken.
+/// Number of runs with different random numbers, for averages and spreads.
 const RUNS: usize = 64;
 
-/// Mean and standard deviation over the runs.
+/// Returns mean and standard deviation over the runs.
 fn over_runs(values: impl Iterator<Item = f64>) -> (f64, f64) {
     let values: Vec<f64> = values.collect();
     let mean = values.iter().sum::<f64>() / RUNS as f64;
     (mean, (values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (RUNS - 1) as f64).sqrt())
 }
 
-/// Four standard errors of an average over the runs: a chance of 6e-5 each way.
+/// Returns four standard errors of an average over the runs, with a probability of 6e-5 in all.
 fn four_errors(sd: f64) -> f64 {
     4.0 * sd / (RUNS as f64).sqrt()
 }
@@ -167,11 +167,12 @@ fn runs(count: usize, hold: Option<Dwell<f64>>, phase: Phase, readings: &[Option
     (0..RUNS as u64).map(|seed| run(&Particles::new(linear(), hold, ANYWHERE, count, seed), phase, readings)).collect()
 }
 
-/// Averages over the runs against the Kalman filter, entry by entry of the state; the spread of each mean.
+/// Compares averages over the runs with the Kalman filter for each entry of the state, and returns the spread of each
+/// mean.
 ///
-/// Weights that sum to one make a mean of N particles biased by σ C/N, where its own spread is s = σ √(C/N): by s²/σ.
-/// The spread of the mean is missing in the cloud's variance: another s², as in any sample, and 2 σ C/N of the deviation
-/// by the weights' bias, which is 2 s² of the variance.
+/// Normalising the weights biases a mean of N particles by σ C/N; its own spread is s = σ √(C/N), so the bias is s²/σ.
+/// The cloud's variance lacks the spread of the mean, s², as in any sample; the weights' bias takes σ C/N from the
+/// standard deviation, which is 2 s² of the variance.
 fn check_moments(kalman: &Kalman, runs: &[(Cloud, f64)], states: std::ops::Range<usize>) -> Vec<f64> {
     let moments: Vec<_> = runs.iter().map(|(cloud, _)| cloud.moments()).collect();
     states
@@ -202,8 +203,8 @@ fn on_a_linear_model_it_is_the_kalman_filter_but_for_chance() {
     let many = runs(9000, None, Phase::Extend, &readings);
     let spread = (check_moments(&kalman, &few, 0..5), check_moments(&kalman, &many, 0..5));
     for (i, (few, many)) in spread.0.iter().zip(&spread.1).enumerate() {
-        // Nine times the particles: a ninth of the variance, in a ratio of two estimates with 63 degrees of freedom
-        // each, of which 99.99 % are between 1/2.7 and 2.7.
+        // Nine times the particles give a ninth of the variance. A ratio of two estimates with 63 degrees of freedom
+        // each lies between 1/2.7 and 2.7 in 99.99 % of cases.
         let ratio = (few / many).powi(2) / 9.0;
         assert!(ratio > 1.0 / 2.7 && ratio < 2.7, "state {i}: {ratio}");
     }
@@ -216,7 +217,7 @@ fn on_a_linear_model_it_is_the_kalman_filter_but_for_chance() {
 }
 
 /// A body that stands for 300 s. If holds never end, the posterior is that of a Kalman filter for a constant strain. The
-/// kernel that keeps particles apart must not widen, narrow or move it.
+/// kernel that keeps particles apart must not widen, narrow or shift it.
 #[test]
 fn in_a_hold_without_end_it_is_the_kalman_filter() {
     let mut kalman = Kalman::new(false);

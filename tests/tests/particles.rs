@@ -1,5 +1,5 @@
 //! The particle filter beyond linear models: on data from its own process it is calibrated, also after long holds; where
-//! directions matter it agrees with Gaussians cut by direction; stops stop; and bad input is refused.
+//! directions matter, it agrees with Gaussians truncated by direction; stops work; and invalid input is rejected.
 
 use ohmstrain_ekf::{Belief, Dwell, Estimate, Evidence, Mixture, Reading, Settling, SignSplit, State, StepError};
 use ohmstrain_model::{Phase, Scalar, StrainRange};
@@ -25,7 +25,7 @@ fn uniform(rng: &mut ChaCha12Rng) -> f64 {
     (rng.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// The process of [`sensor`] with holds, by Euler steps of a twentieth of a step: written from the equations in NOTATION.md
+/// The process of [`sensor`] with holds, in Euler steps of a twentieth of a step, written from the equations in NOTATION.md
 /// with the sensor's numbers.
 struct Process {
     rng: ChaCha12Rng,
@@ -83,13 +83,14 @@ impl Process {
     }
 }
 
-/// Readings of 10 s from a hundred bodies. With the right predictive moments NIS has mean one whatever its distribution;
-/// that of a hundred averages is known to a tenth of their spread. And 95 of 100 intervals cover, 88 at least in 99.8 %
-/// of cases (binomial).
+/// Checks readings of 10 s from a hundred bodies. With correct predictive moments, NIS has mean one whatever its
+/// distribution; the mean of a hundred averages is known to a tenth of their spread. On average 95 of 100 intervals
+/// cover the strain, and at least 88 in 99.8 % of cases (binomial).
 fn check_calibration(dwell_s: Option<(f64, f64)>) {
     let model = sensor::<f64, 2, 5>();
     let prepared = model.prepare(DT_S);
-    // A body that sets off in either direction with even odds turns around by its rate, not by the chain: reversal 0.
+    // A body that starts in either direction with equal probability turns around by its rate, not by the chain:
+    // reversal 0.
     let hold = dwell_s.map(|(hold_s, move_s)| Dwell::new(hold_s, move_s, 0.0).unwrap());
     let (mut averages, mut covered) = (Vec::new(), 0);
     for seed in 0..100 {
@@ -120,9 +121,9 @@ fn on_its_own_process_it_is_calibrated() {
     check_calibration(Some((2.0, 2.0)));
 }
 
-/// Ten seconds of motion, then a hold of 300 s, 15 times the mean duration that the filter expects: every particle has set
-/// off again and again, and what is left are copies of those that did not. Without the kernel less than a quarter of
-/// them differ in the end.
+/// Ten seconds of motion, then a hold of 300 s, 15 times the mean duration that the filter expects: particles keep
+/// starting to move, and in the end only copies of those that did not are left. Without the kernel, less than a quarter
+/// of them would be distinct.
 #[test]
 fn long_holds_do_not_use_the_particles_up() {
     let model = sensor::<f64, 2, 5>();
@@ -142,7 +143,8 @@ fn long_holds_do_not_use_the_particles_up() {
         strains.sort_unstable_by(f64::total_cmp);
         strains.dedup();
         assert!(strains.len() > 500, "{} different strains", strains.len());
-        // Those that set off within the second or two before, one in twenty each second, may not have been found out yet.
+        // Particles that started to move within the last second or two, one in twenty per second, may not have been
+        // rejected yet.
         assert!(cloud.phase_probabilities()[1] > 0.5);
         let moments = cloud.moments();
         let error = moments.mean[0] - process.strain;
@@ -156,8 +158,8 @@ fn long_holds_do_not_use_the_particles_up() {
 }
 
 /// A sign-split mixture of many Gaussians is close to the posterior that particles sample where directions decide. A mean
-/// that is d deviations off costs d²/2 nats of the log score per row; a deviation that is wrong by a factor f costs
-/// ln² f. Both stay below 0.05 nats. The average over eight clouds takes most of the particles' own scatter out.
+/// off by d standard deviations costs d²/2 nats of the log score per row; a standard deviation wrong by a factor f costs
+/// ln² f. Both stay below 0.05 nats. The average over eight clouds removes most of the particles' own scatter.
 #[test]
 fn it_agrees_with_gaussians_cut_by_direction() {
     const CLOUDS: usize = 8;
@@ -192,8 +194,8 @@ fn it_agrees_with_gaussians_cut_by_direction() {
     assert!(odds_apart / steps < 0.05, "{}", odds_apart / steps);
 }
 
-/// A body that starts on one stop forgets it: between stops that lie evenly about the mean strain, so do the particles in
-/// the end. Without readings they are independent, so four standard errors of their mean bound it.
+/// A body that starts at one stop forgets it: if the stops are symmetric about the mean strain, so are the particles in
+/// the end. Without readings they are independent, so four standard errors bound their mean.
 #[test]
 fn stops_hold_and_do_not_push() {
     let model = sensor::<f64, 2, 5>();
@@ -208,7 +210,7 @@ fn stops_hold_and_do_not_push() {
     }
     let strain = (cloud.moments().mean[0], cloud.moments().covariance[(0, 0)].sqrt());
     assert!((strain.0 - 0.15).abs() < 4.0 * strain.1 / 4000_f64.sqrt(), "{strain:?}");
-    // A body at rest on a stop stays what it is.
+    // A body at rest at a stop does not change.
     let endless = Dwell::new(1e12, 1.0, 0.0).unwrap();
     let filter = Particles::new(model, Some(endless), within(0.05, 0.25), 100, 1);
     let start: Cloud = filter.start(&Belief::independent(mean, &[1e-4, 0.0, 0.0, 0.0, 0.0]), Phase::Hold);
@@ -246,7 +248,8 @@ fn the_seed_decides_and_bad_input_is_refused_by_name() {
     let refused = filter.step_prepared(&cloud, &prepared, DT_S, negative).unwrap_err();
     assert_eq!(refused, StepError::NegativeVariance);
     assert_eq!(cloud, before);
-    // A missing reading weighs nothing, and a step of zero seconds without one changes only what chance comes next.
+    // A missing reading changes no weight, and a step of zero seconds without a reading changes only the state of the
+    // random numbers.
     let missing = filter.step_prepared(&cloud, &model.prepare(0.0), 0.0, None).unwrap();
     assert_eq!((missing.log_likelihood, missing.nis), (0.0, None));
     if missing.effective_count >= 100.0 {
@@ -254,7 +257,7 @@ fn the_seed_decides_and_bad_input_is_refused_by_name() {
     }
 }
 
-/// A likelihood to the power 0 weighs nothing, whatever the reading; branches and baseline learn from it all the same.
+/// A likelihood to the power 0 changes no weight, whatever the reading; branches and baseline are still updated.
 #[test]
 fn tempering_takes_weight_from_readings() {
     let model = sensor::<f64, 2, 5>();

@@ -1,6 +1,6 @@
-//! Do phase probabilities mean what they say? Data are drawn from the very process the filters assume. Of the rows at
-//! which a filter gives a phase a probability between p and p + 0.2, the mean probability must be the share of rows that
-//! have that phase; and a filter that is told wrong dwell times must be found out.
+//! Calibration of phase probabilities. Data are drawn from the process that the filters assume. Over the rows at which a
+//! filter gives a phase a probability between p and p + 0.2, the mean probability must equal the share of rows with that
+//! phase. A filter with wrong dwell times must fail.
 //!
 //! Rows of a run are correlated, runs are independent. Per run, the sum over the rows of a bin of (has the phase) minus
 //! (probability given) has mean zero if the probabilities are right. The sum over runs divided by the root of the sum of
@@ -44,12 +44,12 @@ impl Process {
         Self { draws: Draws::new(seed), phase: Phase::Hold, state: SVector::zeros(), roots }
     }
 
-    /// The next phase and reading.
+    /// Returns the next phase and reading.
     fn step(&mut self) -> (Phase, f64) {
         let model = switching_sensor();
         let next = self.next_phase();
         if next != Phase::Hold && next != self.phase {
-            // The rate is drawn anew from the phase's prior.
+            // The rate is redrawn from the phase's prior.
             let (speed, sd) = (model.motion().phase_rate(), model.motion().stationary_variance()[1].sqrt());
             self.state[1] = if next == Phase::Retract { -speed } else { speed } + sd * self.draws.normal();
         }
@@ -89,14 +89,14 @@ impl Clustered {
         self.runs += 1;
     }
 
-    /// Standard normal if the mean is zero.
+    /// Returns the z-score, which is standard normal if the mean is zero.
     fn z(&self) -> f64 {
         assert!(self.runs >= 100, "too few runs for a normal distribution: {}", self.runs);
         self.sum / self.squares.sqrt()
     }
 }
 
-/// The reliability table of a filter, by phase and probability, and its mean NIS less one.
+/// Reliability table of a filter, by phase and probability, and its mean NIS minus one.
 struct Reliability {
     bins: [[Clustered; BINS]; 3],
     nis: Clustered,
@@ -137,7 +137,7 @@ impl Reliability {
         self.bins.map(|row| row.map(|bin| bin.z()))
     }
 
-    /// The largest deviation in the table.
+    /// Returns the largest deviation in the table.
     fn worst(&self) -> f64 {
         self.z_scores().iter().flatten().fold(0.0, |worst, z| z.abs().max(worst))
     }
@@ -153,7 +153,7 @@ fn hypotheses(dwell: Dwell<f64>) -> Reliability {
     Reliability::of(&filter, &Mixture::single(start(), Phase::Hold))
 }
 
-/// Two-sided 99.9 % of the standard normal.
+/// Returns the two-sided 99.9 % quantile of the standard normal.
 fn bound() -> f64 {
     Normal::standard().inverse_cdf(0.9995)
 }

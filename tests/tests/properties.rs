@@ -1,5 +1,5 @@
-//! Properties of every estimator, whatever the recording: units are arbitrary, a missing reading is a prediction, and a step
-//! is as good as two halves.
+//! Properties of every estimator on any recording: units are arbitrary, a missing reading is a prediction, and a step equals
+//! two halves.
 
 use nalgebra::{DMatrix, SVector};
 use ohmstrain_ekf::{
@@ -13,15 +13,16 @@ use proptest::prelude::*;
 type Sensor = SwitchedModel<f64, 2, 5>;
 type State = Belief<f64, 5, 15>;
 
-/// Seconds since the row before, and a reading relative to R₀.
+/// Time since the previous row, s, and a reading relative to R₀.
 type Row = (f64, Option<f64>);
 
-/// Readings that no sensor gives, hundreds of deviations from what is expected.
+/// Implausible readings, hundreds of standard deviations from the expected ones.
 fn wild() -> impl Strategy<Value = Vec<Row>> {
     prop::collection::vec((0.005..0.4_f64, prop::option::weighted(0.8, -0.1..0.6_f64)), 1..40)
 }
 
-/// Readings of a strain that wanders between 0 and 0.3, a few deviations from what is expected: rounding has a bound.
+/// Readings of a strain that wanders between 0 and 0.3, a few standard deviations from the expected ones, so that
+/// rounding is bounded.
 fn tame() -> impl Strategy<Value = Vec<Row>> {
     let row = (0.005..0.4_f64, -0.1..0.1_f64, prop::option::weighted(0.8, -5e-3..5e-3_f64));
     prop::collection::vec(row, 1..40).prop_map(|rows| {
@@ -34,7 +35,7 @@ fn tame() -> impl Strategy<Value = Vec<Row>> {
     })
 }
 
-/// Strains are counted in units of `1/strain`, readings in units of `R₀/reading`.
+/// Units: strains are in units of `1/strain`, readings in units of `R₀/reading`.
 #[derive(Clone, Copy, Debug)]
 struct Units {
     strain: f64,
@@ -106,7 +107,7 @@ impl Units {
     }
 }
 
-/// Filtered and smoothed beliefs in plain units.
+/// Returns filtered and smoothed beliefs in plain units.
 fn one_gaussian<M: Dynamics<f64, 5, 15> + Channel<f64, 5, 15>>(
     filter: impl Fn(Sensor) -> Ekf<M>,
     units: Units,
@@ -133,7 +134,7 @@ fn run<M: Dynamics<f64, N, L> + Channel<f64, N, L>, const N: usize, const L: usi
     rows.iter().map(step).collect()
 }
 
-/// Moments and phase probabilities of a filter of hypotheses, in plain units.
+/// Returns moments and phase probabilities of a filter of hypotheses, in plain units.
 fn mixture<E: Estimator<f64, 5, 15>>(
     units: Units,
     rows: &[Row],
@@ -148,7 +149,7 @@ fn mixture<E: Estimator<f64, 5, 15>>(
     rows.iter().map(step).collect()
 }
 
-/// All three filters of hypotheses, one after the other.
+/// Returns the results of all three filters of hypotheses, one after the other.
 fn mixtures(units: Units, rows: &[Row]) -> Vec<(State, [f64; 3])> {
     let (sensor, evidence, dwell) = (units.sensor(), units.evidence(), Dwell::new(2.0, 1.0, 0.3).unwrap());
     let start: Belief<f64, 5, 15> = Belief::initial(&sensor);
@@ -161,7 +162,7 @@ fn mixtures(units: Units, rows: &[Row]) -> Vec<(State, [f64; 3])> {
     all
 }
 
-/// True if two beliefs agree within a share of the standard deviations.
+/// True if two beliefs agree within a fraction of the standard deviations.
 fn alike<const N: usize, const L: usize>(a: &Belief<f64, N, L>, b: &Belief<f64, N, L>, tolerance: f64) -> bool {
     let sd = |i: usize| b.covariance[(i, i)].sqrt();
     (0..N).all(|i| {
@@ -170,8 +171,8 @@ fn alike<const N: usize, const L: usize>(a: &Belief<f64, N, L>, b: &Belief<f64, 
     })
 }
 
-/// 2⁻³⁰ is about 1e-9. Powers of two scale every number without rounding, so nothing may change by a single bit: what has
-/// an absolute size somewhere shows.
+/// 2⁻³⁰ is about 1e-9. Powers of two scale every number without rounding, so no bit may change; any absolute scale in the
+/// code becomes visible.
 const STRAIN_UNITS: [f64; 3] = [1.0 / 1_073_741_824.0, 128.0, 1_048_576.0];
 
 proptest! {
@@ -195,10 +196,10 @@ proptest! {
         }
     }
 
-    /// The unit of the reading adds a constant to every log-likelihood, up to 21 here, that is taken out again by
-    /// normalising; the log-likelihoods themselves are of order 100 at most. Over 40 rows that leaves 40 · 121 · ε = 1e-12
-    /// of a weight; hypotheses a few deviations apart carry it into the moments, and the filter's memory adds up a few
-    /// dozen of those.
+    /// The unit of the reading adds a constant of up to 21 to every log-likelihood, which normalisation removes; the
+    /// log-likelihoods themselves are at most of order 100. Over 40 rows that leaves a relative error of 40 · 121 · ε =
+    /// 1e-12 in a weight. Hypotheses a few standard deviations apart carry it into the moments, and the filter's memory
+    /// adds up a few dozen of those.
     #[test]
     fn units_of_readings_do_not_matter_to_mixtures(rows in tame()) {
         let plain = mixtures(PLAIN, &rows);
@@ -247,8 +248,8 @@ proptest! {
     }
 }
 
-/// Rounding. A covariance in which a direction has the share p of its variance costs a gain ε/p of its digits, N² products
-/// each, and does so at every row; p is measured.
+/// Checks with a tolerance for rounding. If a direction has only the share p of its variance left, a gain has an error of
+/// ε/p, with N² products each, at every row; p is measured.
 fn check_split(sensor: &SwitchedModel<f64, 2, 5>, phase: Phase, rows: &[Row], share: f64) -> Result<(), TestCaseError> {
     let start: Belief<f64, 5, 15> = Belief::initial(sensor);
     let halves: Vec<Row> =
@@ -266,7 +267,7 @@ fn check_split(sensor: &SwitchedModel<f64, 2, 5>, phase: Phase, rows: &[Row], sh
     Ok(())
 }
 
-/// The smallest eigenvalue of the correlations of what is not exactly known.
+/// Returns the smallest eigenvalue of the correlations of states not exactly known.
 fn least_share<const N: usize, const L: usize>(belief: &Belief<f64, N, L>) -> f64 {
     let uncertain: Vec<usize> = (0..N).filter(|&i| belief.covariance[(i, i)] > 0.0).collect();
     let sd = |i: usize| belief.covariance[(uncertain[i], uncertain[i])].sqrt();

@@ -1,4 +1,4 @@
-//! Numbers that other programs made: see `made_by` in the fixtures.
+//! Comparison with results of other programs; see `made_by` in the fixtures.
 
 use nalgebra::{SMatrix, SVector, matrix, vector};
 use ohmstrain_ekf::kalman::{self, Filter, Normal, Ukf, smooth};
@@ -44,7 +44,7 @@ fn viscoelastic(oracle: &Value, curvature: f64) -> (SwitchedModel<f64, 1, 3>, SM
         baseline_sd: 0.0,
         baseline_time_s: 1.0,
     };
-    // A random walk of the rate: q = 2 σ²/T, and T so long that nothing pulls the rate back.
+    // A random walk of the rate: q = 2 σ²/T, with T so long that the rate has no pull to zero.
     let rate_time_s = 1e14_f64;
     let rate_sd = (0.5 * p("sa") * rate_time_s).sqrt();
     let motion = Motion::ornstein_uhlenbeck(rate_time_s, rate_sd, 0.0, f64::INFINITY).unwrap();
@@ -116,7 +116,7 @@ fn transition_and_noise_of_the_linear_sensor() {
         let (f_row, q_row) = (numbers(&oracle["F_dt0p02"][i]), numbers(&oracle["Q_dt0p02"][i]));
         for j in 0..3 {
             assert!((f[(i, j)] - f_row[j]).abs() < 1e-15, "F[{i}][{j}]");
-            // The branch noise is exact here and first order there for cross terms: equal to rounding.
+            // Cross terms of the branch noise are exact here and first-order there; they agree to rounding.
             assert!((q[(i, j)] - q_row[j]).abs() < 1e-15, "Q[{i}][{j}] {} vs {}", q[(i, j)], q_row[j]);
         }
     }
@@ -179,7 +179,7 @@ fn sarkkas_unscented_filter_and_smoother() {
     let ukf = Ukf::new((transition, reading), matrix![2.0, 0.0; 0.0, 2.0], matrix![0.5]);
     let mut state = Normal::new(vector![1.0, 1.0], &matrix![1.0, 0.1; 0.1, 1.0]).unwrap();
     let mut steps: Vec<kalman::Step<f64, 2, 1>> = Vec::new();
-    // Their first sample is missing and has no prediction before it: it is the start.
+    // Their first sample is missing, without a prediction before it, so it is the start.
     for z in [1.0, 2.0, 3.0] {
         let step = ukf.step(&state, &[Some(z)]).unwrap();
         state = step.posterior;

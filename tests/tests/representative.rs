@@ -1,4 +1,4 @@
-//! The demo's sensor is as nasty as real ones, and no nastier.
+//! The demo's sensor is as imperfect as real ones, and no worse.
 
 use ohmstrain_bench_data::simulate::{Material, Protocol, SimulationSettings, simulate};
 use ohmstrain_tests::character::{Character, Known};
@@ -14,9 +14,9 @@ fn character(material: Material, seed: u64) -> Character {
     Known { time_s: trace.time_s, reading: trace.readings.values, strain: trace.reference.unwrap().values }.character()
 }
 
-/// The least and the largest of eight public recordings, in percent (richgumy/electromech-stretcher, 7.5 wt-% carbon black:
-/// slow sine, short ramps, triangles, six-sine, sawtooth, four speeds; vistormu/catasta, coated nylon: sine, triangle), as
-/// `docs/simulated-sensor.md` has them.
+/// Smallest and largest values of eight public recordings, percent (richgumy/electromech-stretcher, 7.5 wt-% carbon black:
+/// slow sine, short ramps, triangles, six-sine, sawtooth, four speeds; vistormu/catasta, coated nylon: sine, triangle),
+/// from `docs/simulated-sensor.md`.
 const REAL: [(&str, f64, f64); 4] =
     [("static cubic", 6.0, 14.3), ("loop area", 7.3, 34.8), ("release peak", 0.0, 34.8), ("drift", 0.4, 4.9)];
 

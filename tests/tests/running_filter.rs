@@ -1,5 +1,5 @@
-//! A filter that runs through a recording with broken rows says, bit for bit, what it says of the recording without them.
-//! A smoother that computes states again says, bit for bit, what one says that has kept them all.
+//! A filter gives the same results, bit for bit, on a recording with broken rows and without them. A smoother that
+//! recomputes states gives the same results, bit for bit, as one that stores them all.
 
 use std::collections::BTreeMap;
 
@@ -87,7 +87,7 @@ fn sensor() -> SensorParams {
     }
 }
 
-/// A correction that has learned something from rows that no two are alike.
+/// Returns a correction trained on rows that are all different.
 fn correction() -> CorrectionParams {
     let weights = |rows: usize| (0..rows).map(|k| 0.02 * (1.7 * k as f64).cos()).collect();
     let process = |inputs: Vec<usize>| ProcessParams {
@@ -141,18 +141,18 @@ fn correction() -> CorrectionParams {
     }
 }
 
-/// Everything a filter shows; Rust prints numbers to the last bit.
+/// Returns a filter's full output as text; Rust prints numbers to the last bit.
 fn shown(filter: &dyn Filter) -> String {
     format!("{:?}", filter.output())
 }
 
-/// A smoother that takes every reading for one.
+/// Returns a smoother without a plausibility check.
 fn smoother(params: &SensorParams, kind: EstimatorKind, guard: Guard<f64>) -> Box<dyn Smoother> {
     let options = Options { guard, ..Options::plain() };
     build_smoother_with(params, Learned::of(params).as_ref(), Some(kind), &options).unwrap()
 }
 
-/// A row no filter can take: a time and a reading, and why it is refused.
+/// Returns an invalid row: a time, a reading, and the reason for its rejection.
 fn broken(kind: usize, now_s: f64) -> (f64, f64, StepError) {
     match kind {
         0 => (now_s - 0.1, 0.1, StepError::NegativeTimeStep),
@@ -191,7 +191,7 @@ proptest! {
     }
 }
 
-/// Rows without a reading say nothing: readings before and after them say the same, to the bit, where they are left out.
+/// Rows without a reading have no effect: results at the other rows are the same, to the bit, if they are left out.
 #[test]
 fn rows_without_a_reading_leave_no_trace() {
     let params = sensor();
@@ -231,7 +231,7 @@ fn rows_without_a_reading_leave_no_trace() {
     }
 }
 
-/// A slow sine through a polynomial, with a reading missing now and then, at times that jitter in their last digits.
+/// Returns a slow sine through a polynomial, with some missing readings, at times that jitter in their last digits.
 fn recording(rows: usize) -> (Vec<f64>, Vec<Option<Reading<f64>>>) {
     let reading = |k: usize| {
         let strain = 0.15 + 0.12 * (k as f64 * 0.01).sin();
@@ -240,12 +240,12 @@ fn recording(rows: usize) -> (Vec<f64>, Vec<Option<Reading<f64>>>) {
     (0..rows).map(|k| (k as f64 * 0.05, reading(k))).unzip()
 }
 
-/// Several segments, the last one short; the oracle waits with every row until the last reading is in.
+/// Several segments, the last one short; the oracle holds every row until the last reading.
 #[test]
 fn a_long_recording_is_smoothed_as_if_all_states_were_kept() {
     let (time_s, readings) = recording(10_000);
     let mut params = sensor();
-    // Rows that wait are reported with the wider of two intervals: make them the same.
+    // Waiting rows are reported with the wider of two intervals, so both are made equal.
     params.estimators.values_mut().for_each(|estimator| estimator.strain_sd_scale = 1.0);
     for kind in [EstimatorKind::Ekf, EstimatorKind::SignSplit] {
         for guard in [Guard::none(), Guard::none().with_gate(3.0, 5).unwrap()] {
@@ -277,7 +277,7 @@ fn no_row_is_smoothed_to_nothing() {
     assert_eq!(smoother(&sensor(), kind, Guard::none()).smooth(&[], &[]), Ok(Some(vec![])));
 }
 
-/// Filters of a sensor share its correction: what a smoother says depends neither on the number of calls nor on who asked first.
+/// Filters of a sensor share its correction: a smoother's result depends neither on the number of calls nor on their order.
 #[test]
 fn a_correction_is_shared() {
     let params = SensorParams { default_estimator: EstimatorKind::Corrected, ..sensor() };

@@ -1,14 +1,15 @@
-//! Sigma points of the strain beside the moments that they stand for.
+//! Sigma points of the strain, compared with the exact moments.
 
 use nalgebra::{SMatrix, SVector};
 use ohmstrain_ekf::{AnyCurve, Cubic};
 use ohmstrain_ekf::{Belief, Compact, Curve, Reading, SigmaPoints, SparseEkf};
 use ohmstrain_model::{Gauge, ModelNoise, Motion, SensorLaw, StrainRange, SwitchedModel, Symmetric};
 
-/// Strains far beyond any that are looked at here.
+/// Range far beyond all strains of these tests.
 const WIDE: StrainRange<f64> = StrainRange { lower: -10.0, upper: 10.0 };
 
-/// E[g], Cov(g, ε)/σ² and what a line with that slope leaves of the variance, by the trapezoid rule over ten deviations.
+/// Returns E[g], Cov(g, ε)/σ² and the residual variance of a line with that slope, by the trapezoid rule over ten
+/// standard deviations.
 fn integrated(gauge: &Gauge<f64>, mean: f64, variance: f64) -> [f64; 3] {
     let (sd, steps) = (variance.sqrt(), 4000);
     let over = |f: &dyn Fn(f64) -> f64| -> f64 {
@@ -25,8 +26,8 @@ fn integrated(gauge: &Gauge<f64>, mean: f64, variance: f64) -> [f64; 3] {
     [expected, slope, left]
 }
 
-/// Three points have the moments of a normal distribution up to the fifth: exact for E and slope of a cubic, and for all of a
-/// parabola. The trapezoid rule is exact to rounding for what falls like a normal density.
+/// Three points have the moments of a normal distribution up to the fifth: exact for E and slope of a cubic, and for all
+/// moments of a parabola. The trapezoid rule is exact to rounding for integrands that decay like a normal density.
 #[test]
 fn moments_of_polynomials_are_exact() {
     for (a2, a3) in [(-2.8, 0.0), (0.9, 0.0), (-2.8, 3.0)] {
@@ -44,7 +45,7 @@ fn moments_of_polynomials_are_exact() {
     }
 }
 
-/// A strain that is known has a tangent, and leaves nothing.
+/// An exactly known strain gives the tangent, without residual variance.
 #[test]
 fn without_a_variance_there_is_the_tangent() {
     let gauge = Gauge::DecayingExponential { slope: 3.0, decay_strain: 0.25 };
@@ -84,7 +85,7 @@ fn an_update_is_that_of_the_moments() {
     let variance = h.dot(&(p * h)) + 2.0 * (a2 * spread).powi(2) + 2.5e-5 + 1e-5;
     let gain = p * h / variance;
     let (mean, covariance) = (ahead.mean + gain * (0.3 - expected), p - gain * gain.transpose() * variance);
-    // Numbers of order one, some thirty operations.
+    // Numbers of order one, about thirty operations.
     let tolerance = 30.0 * f64::EPSILON;
     assert!((residual.variance - variance).abs() < tolerance, "{residual:?} {variance}");
     assert!((residual.innovation - (0.3 - expected)).abs() < tolerance, "{residual:?}");
@@ -92,8 +93,8 @@ fn an_update_is_that_of_the_moments() {
     assert!((belief.covariance.to_matrix() - covariance).amax() < tolerance);
 }
 
-/// Near the gauge's peak a tangent says that readings tell nothing; sigma points know how far the strain may be from there, so that
-/// intervals hold. A filter of tangents must fail the same bound.
+/// Near the gauge's peak, the tangent implies that readings carry no information; sigma points account for the distance of the
+/// strain from the peak, so intervals are valid. A filter with tangents must fail the same bound.
 #[test]
 fn near_a_peak_sigma_points_cover_where_tangents_do_not() {
     let law = SensorLaw {
@@ -108,7 +109,7 @@ fn near_a_peak_sigma_points_cover_where_tangents_do_not() {
     let model = SwitchedModel::<f64, 0, 2>::new(law, motion, noise).unwrap();
     let start =
         Belief::<f64, 2, 3> { mean: SVector::from([0.2, 0.0]), covariance: Symmetric::from_packed([0.01, 0.0, 0.04]) };
-    // Strains 1/2 to 3/2 deviations below the mean, which lies on the peak; a reading tells the distance from it.
+    // Strains 1/2 to 3/2 standard deviations below the peak at 0.2; a reading determines the distance from the peak.
     let normalised = |curve: &dyn Fn(f64) -> (f64, f64)| -> f64 {
         let squares = (0..=20).map(|k| 0.2 - 0.1 * (0.5 + 0.05 * f64::from(k)));
         let errors = squares.map(|strain| {

@@ -1,4 +1,4 @@
-//! The sparse path computes what the generic one computes.
+//! The sparse path gives the same results as the generic one.
 
 use nalgebra::SVector;
 use ohmstrain_ekf::{Belief, Compact, Cubic, Ekf, Estimator, Logistic, Reading, SparseEkf, StepError, Switch};
@@ -7,13 +7,14 @@ use ohmstrain_tests::sensor;
 
 const DT_S: f64 = 0.01;
 
-/// A slow sine with a hold: rates that are clear, uncertain and none.
+/// Returns a slow sine with a hold: rates with certain and uncertain directions, and zero rates.
 fn reading(k: usize) -> f64 {
     0.15 + 0.12 * (k as f64 * 0.01).sin().clamp(-0.8, 0.8)
 }
 
-/// Largest difference of a step from the generic one over 3000 steps, each from the same belief: of means in deviations, of
-/// covariances relative to their diagonals; and of the log-likelihood of all of them.
+/// Returns the largest difference of a step from the generic one over 3000 steps, each from the same belief: of means in
+/// standard deviations, and of covariances relative to their diagonals. Also returns the difference of the total
+/// log-likelihood.
 fn differences<T: Scalar, const B: usize, const N: usize, const L: usize>() -> (f64, f64) {
     let model: SwitchedModel<T, B, N> = sensor();
     let generic = Ekf::new(model);
@@ -43,7 +44,7 @@ fn differences<T: Scalar, const B: usize, const N: usize, const L: usize>() -> (
     (worst, (accumulated - sum).abs())
 }
 
-/// A step is some 30 operations deep, on quantities up to S/R ≈ 100 times larger than what is left: 3000 ε of f64.
+/// A step is about 30 operations deep, on quantities up to S/R ≈ 100 times larger than the result: 3000 ε of f64.
 #[test]
 fn agrees_with_the_generic_path_to_rounding() {
     for (difference, likelihood) in [
@@ -55,14 +56,14 @@ fn agrees_with_the_generic_path_to_rounding() {
         differences::<f64, 3, 6, 21>(),
     ] {
         assert!(difference < 3000.0 * f64::EPSILON, "{difference:e}");
-        // 3000 sums of some units each.
+        // 3000 sums of a few units each.
         assert!(likelihood < 1e4 * 3000.0 * f64::EPSILON, "{likelihood:e}");
     }
     let (difference, _) = differences::<f32, 3, 6, 21>();
     assert!(difference < 3000.0 * f64::from(f32::EPSILON), "{difference:e}");
 }
 
-/// Simpson's rule over the density that the split stands for.
+/// Compares the split with Simpson's rule over its density.
 #[test]
 fn the_compact_split_integrates_its_density() {
     let density = |u: f64| 35.0 / 96.0 * (1.0 - u * u / 9.0).max(0.0).powi(3);
@@ -82,7 +83,7 @@ fn the_compact_split_integrates_its_density() {
         assert!((split.extend + split.retract - sd * rate).abs() < 1e-15, "{rate}");
         assert!((split.extend_probability + split.retract_probability - 1.0).abs() < 1e-15, "{rate}");
     }
-    // The figure in its documentation, against the normal distribution itself.
+    // Checks the number in its documentation against the normal distribution.
     let normal = |u: f64| (-0.5 * u * u).exp() / (2.0 * std::f64::consts::PI).sqrt();
     let off = (-400..=400)
         .map(|k| f64::from(k) * 0.01)
@@ -105,11 +106,11 @@ fn stays_a_covariance_in_single_precision() {
             nalgebra::SMatrix::<f64, 6, 6>::from_fn(|i, j| f64::from(belief.covariance[(i, j)]) / (sd[i] * sd[j]));
         least = least.min(correlation.symmetric_eigenvalues().min());
     }
-    // An eigenvalue of a 6 × 6 correlation matrix is uncertain by 6 ε; twice that for one step's rounding.
+    // An eigenvalue of a 6 × 6 correlation matrix is uncertain by 6 ε; twice that allows for one step's rounding.
     assert!(least > -12.0 * f64::from(f32::EPSILON), "{least:e}");
 }
 
-/// Within the gate it is the step, beyond it the prediction, and what is refused is refused.
+/// Within the gate, a gated step is the step; beyond it, the prediction; refused steps stay refused.
 #[test]
 fn a_gated_step_is_a_step_or_a_prediction() {
     let model: SwitchedModel<f64, 3, 6> = sensor();
@@ -153,7 +154,7 @@ fn an_error_leaves_the_belief() {
     assert!(SparseEkf::<f64, Compact, 1, 3>::new(model, f64::NAN).is_err());
 }
 
-/// Whatever a belief has lost, no step passes it on, with a reading or without.
+/// No step, with or without a reading, passes on an invalid belief.
 #[test]
 fn a_lost_belief_goes_no_further() {
     let model: SwitchedModel<f64, 1, 4> = sensor();
@@ -176,8 +177,8 @@ fn a_lost_belief_goes_no_further() {
     }
 }
 
-/// Largest difference of beliefs smoothed by the sparse filter and by the general one, both with the logistic switch: of single
-/// steps back, and of steps one after another through the whole series.
+/// Returns the largest differences of beliefs smoothed by the sparse and the general filter, both with the logistic switch: for
+/// single backward steps, and for successive steps through the whole series.
 fn smoothed_differences<const B: usize, const N: usize, const L: usize>() -> [f64; 2] {
     let model: SwitchedModel<f64, B, N> = sensor();
     let readings: Vec<_> =
@@ -212,7 +213,7 @@ fn smoothed_differences<const B: usize, const N: usize, const L: usize>() -> [f6
     };
     let (mut beside, mut along, mut smoothed) = (0.0_f64, 0.0_f64, [belief; 2]);
     for k in (1..readings.len()).rev() {
-        // Another belief than the filter's own: one that later readings have moved by a deviation and narrowed.
+        // A belief that later readings have moved by a standard deviation and narrowed.
         let next = &filtered[k];
         let sd = next.covariance.to_matrix().diagonal().map(f64::sqrt);
         let later = Belief { mean: next.mean + sd, covariance: next.covariance.scaled(0.5) };
@@ -224,9 +225,9 @@ fn smoothed_differences<const B: usize, const N: usize, const L: usize>() -> [f6
     [beside, along]
 }
 
-/// A step as in the tests above, 3000 ε; 800 of them one after another. A step backwards solves for the gain in directions down to
-/// ε^⅔ of their variance, which costs up to N² ε^⅓ of the covariance where a direction is that certain; here none is below 10⁻⁴,
-/// where a gain of up to 10² makes 10² of a rounding.
+/// A step as in the tests above, 3000 ε; 800 successive steps. A backward step solves for the gain in directions down to ε^⅔ of
+/// their variance, which costs up to N² ε^⅓ of the covariance for a direction as certain as that. Here none is below 10⁻⁴, for
+/// which a gain of up to 10² amplifies a rounding by 10².
 #[test]
 fn goes_back_as_the_general_filter_does() {
     for [beside, along] in [
@@ -240,7 +241,7 @@ fn goes_back_as_the_general_filter_does() {
     }
 }
 
-/// A filter for another step length is the filter made for it; a cubic by itself is the cubic among other gauges.
+/// A retimed filter equals a new filter for that step length; the cubic-only curve equals the cubic among other gauges.
 #[test]
 fn a_retimed_filter_is_a_new_one() {
     let model: SwitchedModel<f64, 3, 6> = sensor();
@@ -258,27 +259,27 @@ fn a_retimed_filter_is_a_new_one() {
     let any = SparseEkf::<f64, Compact, 3, 6>::new(model, DT_S).unwrap();
     let (mut a, mut b) = (Belief::<f64, 6, 21>::initial(&model), Belief::<f64, 6, 21>::initial(&model));
     for k in 0..300 {
-        // Beyond the range too, where both go on along the tangent.
+        // Also beyond the range, where both continue along the tangent.
         let reading = Some(Reading::from(reading(k) + 0.002 * k as f64));
         any.step(&mut a, reading).unwrap();
         same.step(&mut b, reading).unwrap();
     }
     for i in 0..6 {
-        // 300 steps, each off by some roundings of numbers up to 1/sd ≈ 1e3 larger than what a deviation resolves.
+        // 300 steps, each off by a few roundings of numbers up to 1/sd ≈ 1e3 times larger than a standard deviation.
         let sd = a.covariance[(i, i)].sqrt();
         assert!((a.mean[i] - b.mean[i]).abs() < 300.0 * 1e3 * f64::EPSILON * sd, "{i}");
     }
 }
 
-/// Beliefs that are no covariances, with numbers up to the end of `f32`: a step refuses them or leaves finite numbers, no
-/// negative variance among them. The kernel looks at few of its numbers; this looks at all.
+/// Beliefs with invalid covariances, and numbers up to the limit of `f32`: a step refuses them, or leaves finite numbers
+/// without a negative variance. The kernel checks only a few of its numbers; this test checks all.
 #[test]
 fn what_a_step_accepts_is_finite() {
     let model: SwitchedModel<f32, 3, 6> = sensor();
     let ekf = SparseEkf::<f32, Compact, 3, 6>::new(model, DT_S as f32).unwrap();
     let mut state = 1_u64;
     let mut uniform = || {
-        // Knuth's MMIX generator; the upper bits.
+        // Upper bits of Knuth's MMIX generator.
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 40) as f32 / (1_u64 << 24) as f32
     };

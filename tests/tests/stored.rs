@@ -1,4 +1,4 @@
-//! Values that a user stores or sends come back as they were: feature `serde` of model and filters.
+//! Stored or sent values are restored unchanged: feature `serde` of model and filters.
 
 use std::fmt::Debug;
 
@@ -13,7 +13,7 @@ use ohmstrain_tests::sensor;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// Through JSON and back.
+/// Converts a value to JSON and back.
 fn returned<V: Serialize + DeserializeOwned>(value: &V) -> V {
     serde_json::from_str(&serde_json::to_string(value).unwrap()).unwrap()
 }
@@ -22,7 +22,7 @@ fn returns<V: Serialize + DeserializeOwned + PartialEq + Debug>(value: V) {
     assert_eq!(returned(&value), value);
 }
 
-/// A belief after some readings: numbers without a short decimal form.
+/// Returns a belief after some readings, whose numbers have no short decimal form.
 fn belief<T: Scalar>(ekf: &Ekf<SwitchedModel<T, 3, 6>>) -> Belief<T, 6, 21> {
     (0..30).fold(Belief::initial(ekf.model()), |belief, k| {
         let reading = Reading { value: T::of(0.004 * f64::from(k)), extra_variance: T::of(1e-7) };
@@ -92,12 +92,12 @@ fn what_is_no_value_is_refused() {
     };
     no("[1.0, 0.0]");
     no("[1.0, 0.0, 1.0, 0.0]");
-    // JSON has no NaN; it is written as null, which is no number.
+    // JSON has no NaN; it is written as null, which is not a number.
     no(&serde_json::to_string(&[f64::NAN, 0.0, 1.0]).unwrap());
     let noise = r#"{"reading_sd":0.002,"branch_sd":0.005,"baseline_sd":0.02}"#;
     assert!(serde_json::from_str::<ModelNoise<f64>>(noise).is_err());
 
-    // What is well-formed and no law is refused where every law is: by the model.
+    // A well-formed but invalid law is rejected by the model, like every invalid law.
     let model = sensor::<f64, 1, 4>();
     let mut text = serde_json::to_value(model.law()).unwrap();
     text["branches"][0]["tau_s"] = (-1.0).into();

@@ -1,5 +1,5 @@
-//! One sensor and a coarse strain gauge beside it, two readings per step, through adskalman's Kalman filter; the same
-//! with this crate's own filter, one reading after the other. Both print the same numbers.
+//! One sensor and a coarse strain gauge, two readings per step, filtered with adskalman's Kalman filter. This crate's
+//! own filter takes the same readings one after the other. Both print the same numbers.
 //!
 //! ```sh
 //! cargo run -p ohmstrain-ekf --example adskalman --features adskalman
@@ -32,7 +32,7 @@ impl Channel<f64, N, L> for CoarseStrain {
     }
 }
 
-/// An `Ekf` wants dynamics and channel in one model; these are the sensor's.
+/// An `Ekf` needs dynamics and channel in one model; these dynamics are the sensor's.
 impl Dynamics<f64, N, L> for CoarseStrain {
     type Prepared = <Sensor as Dynamics<f64, N, L>>::Prepared;
 
@@ -66,11 +66,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     for k in 0..=200 {
         let readings = readings(k);
 
-        // adskalman: linearise at its own estimate, leave out what is missing, and take both at once.
+        // adskalman: linearise at its own estimate, leave out missing readings, and take both at once.
         let step = LinearStep::linearise(&sensor, [&sensor, &coarse], &prepared, &(&theirs).into(), None);
         let (step, values) = step.take(&readings)?;
         let next = KalmanFilterNoControl::new(&step, &step).step(&theirs, &values);
-        // Without its std feature, which brings logging along, adskalman's error is no `Error`.
+        // Without its std feature, which also enables logging, adskalman's error does not implement `Error`.
         theirs = next.map_err(|error| format!("{error:?}"))?;
 
         // Ours: a step with the first reading, a step of zero seconds with the second.
@@ -88,11 +88,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// A slow stretch and release; each reading is missing now and then.
+/// A slow stretch and release; each reading is sometimes missing.
 fn readings(k: i32) -> [Option<Reading<f64>>; 2] {
     let strain = 0.12 - 0.1 * (0.02 * f64::from(k)).cos();
     let resistance = 1.9 * strain - 2.8 * strain * strain;
-    // The coarse gauge reads in steps of 0.02.
+    // The coarse gauge has a resolution of 0.02.
     let coarse = (strain / 0.02).round() * 0.02;
     [(k % 7 != 3).then(|| resistance.into()), (k % 3 == 0).then(|| coarse.into())]
 }

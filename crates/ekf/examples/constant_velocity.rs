@@ -1,9 +1,10 @@
-//! A body of constant velocity whose position is read every 0.1 s, with gaps. Prints its speed and the error bar.
+//! A body of constant velocity whose position is read every 0.1 s, with gaps. Prints its speed and the standard
+//! deviation.
 
 use nalgebra::{matrix, vector};
 use ohmstrain_ekf::kalman::{Filter, Kalman, KalmanError, Normal};
 
-/// Positions, m, read to 0.05 m; NaN where there is none.
+/// Positions, m, with a noise of 0.05 m; NaN where a reading is missing.
 pub const POSITIONS: [f64; 12] =
     [0.02, 0.05, f64::NAN, 0.13, 0.11, 0.16, f64::NAN, f64::NAN, f64::NAN, 0.29, 0.26, 0.36];
 

@@ -1,13 +1,14 @@
-//! A vehicle's position at irregular times; a camera's is right but 0.4 s late. Prints the position, m, at the end.
+//! A vehicle's position at irregular times; a camera's reading is correct but arrives 0.4 s late. Prints the position,
+//! m, at the end.
 
 use nalgebra::{matrix, vector};
 use ohmstrain_ekf::kalman::{Kalman, KalmanError, Normal, Rewind};
 
-/// Time, s, and position, m, in the order in which they arrive; the one of 0.55 s is the camera's.
+/// Time, s, and position, m, in the order in which they arrive; the reading of 0.55 s is the camera's.
 pub const ARRIVALS: [(f64, f64); 8] =
     [(0.1, 0.22), (0.3, 0.58), (0.5, 1.07), (0.6, 1.16), (0.8, 1.63), (0.95, 1.86), (0.55, 1.10), (1.1, 2.25)];
 
-/// The filter of a step from one time to another.
+/// Returns the filter of a step from one time to another, s.
 pub fn filter(from_s: f64, to_s: f64) -> Kalman<f64, 2, 1> {
     let dt = to_s - from_s;
     let noise = matrix![dt.powi(3) / 3.0, dt.powi(2) / 2.0; dt.powi(2) / 2.0, dt] * 0.1;

@@ -1,4 +1,4 @@
-//! The flow of the Nile, 1871–1970, as a random walk read with noise. Prints both variances and the log-likelihood.
+//! The flow of the Nile, 1871–1970, as a random walk observed with noise. Prints both variances and the log-likelihood.
 
 use nalgebra::{matrix, vector};
 use ohmstrain_ekf::kalman::{Filter, Kalman, KalmanError, NoMaximum, Normal, maximise};

@@ -3,12 +3,12 @@
 use nalgebra::{Vector1, matrix, vector};
 use ohmstrain_ekf::kalman::{Filter, KalmanError, Normal, Ukf, maximise};
 
-/// Pumped in at step k, m.
+/// Inflow at step k, m.
 pub fn pumped(k: i32) -> f64 {
     if k % 50 < 25 { 0.02 } else { 0.08 }
 }
 
-/// The level read 400 times, m, with a noise of 0.02; the model's is 0.005.
+/// 400 readings of the level, m, with a noise of 0.02 m; the noise of the model is 0.005 m.
 pub fn readings() -> Vec<f64> {
     let (mut level, noise) = (1.0_f64, |k: i32, sd: f64| sd * std::f64::consts::SQRT_2 * f64::from(k).sin());
     let step = |k: i32| {

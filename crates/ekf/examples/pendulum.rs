@@ -5,7 +5,7 @@ use ohmstrain_ekf::kalman::{Ekf, Filter, KalmanError, Normal, Ukf, smooth};
 
 const DT: f64 = 0.05;
 
-/// The next angle, rad, and its rate, rad/s.
+/// Returns the next angle, rad, and its rate, rad/s.
 pub fn swing(x: &Vector2<f64>) -> Vector2<f64> {
     let rate = x[1] - 9.81 * x[0].sin() * DT;
     vector![x[0] + rate * DT, rate]

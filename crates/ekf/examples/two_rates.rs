@@ -1,9 +1,9 @@
-//! A thermometer read every second and a better one read every ten, whose errors are alike in part. Prints the temperature.
+//! A thermometer read every second and a better one read every ten seconds, with correlated errors. Prints the temperature.
 
 use nalgebra::{matrix, vector};
 use ohmstrain_ekf::kalman::{Filter, Kalman, KalmanError, Normal};
 
-/// Readings of both at second k, °C, of 20 °C that rise by 0.02 °C a second.
+/// Readings of both at second k, °C; the temperature starts at 20 °C and rises by 0.02 °C per second.
 pub fn reading(k: i32) -> [Option<f64>; 2] {
     let temperature = 20.0 + 0.02 * f64::from(k);
     let (coarse, fine) = (f64::from(k * k).sin(), f64::from(7 * k).cos());

@@ -1,12 +1,13 @@
-//! Any of our models through adskalman's Kalman filter: for those who use it already, and for several readings at once.
+//! Models of this crate in adskalman's Kalman filter: for existing users of adskalman, and for several readings at
+//! once.
 //!
-//! Readings whose noises are independent can be taken one after the other with [`Ekf::step`](crate::Ekf::step), steps of
-//! zero seconds in between, at less cost and with the second channel linearised where the first one led to. Readings
-//! with correlated noise (two sensors on one supply) need the vector form: [`LinearStep::with_noise`].
+//! Readings with independent noise can be taken one after the other with [`Ekf::step`](crate::Ekf::step), in steps of
+//! zero seconds. That costs less, and the second channel is linearised at the result of the first. Readings with
+//! correlated noise (two sensors on one supply) need the vector form: [`LinearStep::with_noise`].
 //!
-//! adskalman treats a vector with one NaN as missing altogether. [`LinearStep::take`] takes single components out
-//! instead. In debug builds adskalman refuses covariances that are asymmetric by more than 1e-5 of an entry; ours are
-//! symmetric.
+//! adskalman treats a vector with one NaN as missing altogether. [`LinearStep::take`] removes single components
+//! instead. In debug builds adskalman rejects covariances that are asymmetric by more than 1e-5 of an entry; those of
+//! this crate are symmetric.
 
 use adskalman::{ObservationModel, StateAndCovariance, TransitionModelLinearNoControl};
 use nalgebra::{Const, DimMin, SMatrix, SVector};
@@ -16,8 +17,9 @@ use crate::{Belief, Channel, Dynamics, Reading, StepError};
 
 /// A linearised step as adskalman's transition and observation model, with `M` readings at once.
 ///
-/// The step is affine, `x' = mean + F (x - x̂)` and `y = value + H (x - x̂′)`; the offsets are kept, so nonlinear laws
-/// go through unchanged. For a nonlinear law make a new one at every step. `examples/adskalman.rs` does.
+/// The step is affine, `x' = mean + F (x - x̂)` and `y = value + H (x - x̂′)`; the offsets are kept, so that nonlinear
+/// laws give the same result as in [`Ekf`](crate::Ekf). For a nonlinear law, create a new one at every step, as in
+/// `examples/adskalman.rs`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinearStep<T, const N: usize, const M: usize> {
     from: SVector<T, N>,
@@ -36,7 +38,7 @@ impl<T: Scalar, const N: usize, const M: usize> LinearStep<T, N, M> {
     /// - `from`: the state at which `transition` was linearised.
     /// - `at`: the state at which the observations were linearised, usually `transition.mean`.
     ///
-    /// The readings' noises are taken as independent.
+    /// The readings' noises are assumed independent.
     #[must_use]
     pub fn new<const L: usize>(
         from: SVector<T, N>,
@@ -59,8 +61,8 @@ impl<T: Scalar, const N: usize, const M: usize> LinearStep<T, N, M> {
         }
     }
 
-    /// A prepared step of `model` from `belief`, and what `channels` see after it, all linearised as [`Ekf`](crate::Ekf)
-    /// does.
+    /// Linearises a prepared step of `model` from `belief`, and the readings of `channels` after it, as
+    /// [`Ekf`](crate::Ekf) does.
     #[must_use]
     pub fn linearise<D: Dynamics<T, N, L>, const L: usize>(
         model: &D,
@@ -76,19 +78,20 @@ impl<T: Scalar, const N: usize, const M: usize> LinearStep<T, N, M> {
         Self::new(belief.mean, &transition, prior.mean, &observations)
     }
 
-    /// The same with another covariance R of the readings' noise, that of correlated noises for instance.
+    /// Returns the same step with another covariance R of the readings' noise, for example with correlations.
     #[must_use]
     pub fn with_noise(self, variance: SMatrix<T, M, M>) -> Self {
         Self { variance, ..self }
     }
 
-    /// The step with only those readings that came, and the vector to hand to adskalman with it.
+    /// Returns the step with only the available readings, and the vector of readings to pass to adskalman with it.
     ///
-    /// A missing reading's row of H becomes zero, its noise one and independent, and its value what is expected, so it
-    /// moves nothing. Extra variances are added to R. If no reading came, all values are NaN: for adskalman a prediction.
+    /// For a missing reading the row of H becomes zero, its noise independent with variance one, and its value the
+    /// expected one, so that it has no effect. Extra variances are added to R. If all readings are missing, all values
+    /// are NaN, which adskalman treats as a prediction.
     ///
     /// # Errors
-    /// [`StepError::NonFiniteReading`], where adskalman would take the whole vector as missing.
+    /// [`StepError::NonFiniteReading`], where adskalman would treat the whole vector as missing.
     pub fn take(&self, readings: &[Option<Reading<T>>; M]) -> Result<(Self, SVector<T, M>), StepError> {
         let mut step = *self;
         let mut values = self.value;
@@ -110,7 +113,7 @@ impl<T: Scalar, const N: usize, const M: usize> LinearStep<T, N, M> {
         Ok((step, values))
     }
 
-    /// The step without reading `i < M`, if the expected value is handed to adskalman in its place.
+    /// Returns the step without reading `i < M`; the expected value is passed to adskalman in its place.
     fn without(mut self, i: usize) -> Self {
         self.gradient.row_mut(i).fill(T::zero());
         self.gradient_transposed.column_mut(i).fill(T::zero());
@@ -121,14 +124,14 @@ impl<T: Scalar, const N: usize, const M: usize> LinearStep<T, N, M> {
     }
 }
 
-/// adskalman's form of a belief.
+/// Converts a belief to adskalman's form.
 impl<T: Scalar, const N: usize, const L: usize> From<Belief<T, N, L>> for StateAndCovariance<T, Const<N>> {
     fn from(belief: Belief<T, N, L>) -> Self {
         Self::new(belief.mean, belief.covariance.to_matrix())
     }
 }
 
-/// The lower triangle of adskalman's covariance is read.
+/// Reads the lower triangle of adskalman's covariance.
 impl<T: Scalar, const N: usize, const L: usize> From<&StateAndCovariance<T, Const<N>>> for Belief<T, N, L> {
     fn from(estimate: &StateAndCovariance<T, Const<N>>) -> Self {
         Self { mean: *estimate.state(), covariance: Symmetric::from_lower(estimate.covariance()) }

@@ -8,8 +8,8 @@ use crate::{Advanced, Belief, Channel, Dynamics, Estimator, Innovation, Reading,
 
 /// Extended Kalman filter: one Gaussian, linearised at its mean.
 ///
-/// The smallest estimator. It takes the direction of motion from its own prediction, so where stretching and releasing
-/// both raise the reading it can lock onto the wrong one.
+/// The smallest estimator. It takes the direction of motion from its own prediction, so it can lock onto the wrong
+/// direction where stretching and releasing both raise the reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ekf<M> {
     model: M,
@@ -18,7 +18,7 @@ pub struct Ekf<M> {
 /// Results of one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step<T, const N: usize, const L: usize> {
-    /// The transition from the old belief, as a smoother needs it.
+    /// Transition from the old belief, for a smoother.
     pub transition: Transition<T, N, L>,
     /// The belief before the reading.
     pub prior: Belief<T, N, L>,
@@ -39,14 +39,14 @@ pub struct Update<T, const N: usize> {
     pub innovation_variance: T,
     /// Normalised innovation squared ν²/S: χ² with one degree of freedom if the filter is consistent.
     pub nis: T,
-    /// Log density of the reading before it was seen, constant included.
+    /// Predictive log density of the reading, including the constant.
     pub log_likelihood: T,
     /// Kalman gain K.
     pub gain: SVector<T, N>,
 }
 
 impl<M> Ekf<M> {
-    /// A filter for `model`.
+    /// Creates a filter for `model`.
     pub const fn new(model: M) -> Self {
         Self { model }
     }
@@ -59,7 +59,7 @@ impl<M> Ekf<M> {
     /// Predicts `dt_s ≥ 0` seconds ahead, in as many steps as the model needs, then takes the reading.
     ///
     /// # Errors
-    /// See [`StepError`]; the belief passed in is untouched.
+    /// See [`StepError`]; the belief passed in is unchanged.
     pub fn step<T: Scalar, const N: usize, const L: usize>(
         &self,
         belief: &Belief<T, N, L>,
@@ -78,7 +78,7 @@ impl<M> Ekf<M> {
         self.finish(transition, prior, reading)
     }
 
-    /// The belief after a pause of several steps, and all of them as one transition.
+    /// Returns the transition over a pause of several steps, and the belief after it.
     #[cold]
     #[inline(never)]
     fn predict_over<T: Scalar, const N: usize, const L: usize>(
@@ -96,10 +96,10 @@ impl<M> Ekf<M> {
         })
     }
 
-    /// Steps with a step that was prepared before, for sensors read at a fixed rate.
+    /// Steps with a prepared step, for sensors read at a fixed rate.
     ///
     /// # Errors
-    /// See [`StepError`]; the belief passed in is untouched.
+    /// See [`StepError`]; the belief passed in is unchanged.
     #[inline]
     pub fn step_prepared<T: Scalar, const N: usize, const L: usize>(
         &self,
@@ -114,7 +114,7 @@ impl<M> Ekf<M> {
         self.finish(transition, prior, reading)
     }
 
-    /// The belief a prepared step later, and how it got there.
+    /// Returns the transition over a prepared step, and the belief after it.
     #[inline]
     fn predict<T: Scalar, const N: usize, const L: usize>(
         &self,
@@ -197,7 +197,7 @@ where
     }
 }
 
-/// One transition after another.
+/// Returns the composition of two transitions.
 fn followed_by<T: Scalar, const N: usize, const L: usize>(
     first: &Transition<T, N, L>,
     second: &Transition<T, N, L>,
@@ -209,13 +209,13 @@ fn followed_by<T: Scalar, const N: usize, const L: usize>(
     }
 }
 
-/// A step of zero seconds.
+/// Returns the transition of a step of zero seconds.
 pub(crate) fn stand_still<T: Scalar, const N: usize, const L: usize>(belief: &Belief<T, N, L>) -> Transition<T, N, L> {
     Transition { mean: belief.mean, jacobian: nalgebra::SMatrix::identity(), noise: Symmetric::zeros() }
 }
 
-/// Kalman's update with one scalar reading; the covariance in Joseph's form `(I - K H) P (I - K H)ᵀ + K R Kᵀ`, which
-/// stays positive semi-definite under rounding where `P - K S Kᵀ` does not.
+/// Updates the prior with one scalar reading. The covariance is in Joseph's form `(I - K H) P (I - K H)ᵀ + K R Kᵀ`,
+/// which stays positive semi-definite under rounding where `P - K S Kᵀ` does not.
 #[inline]
 #[allow(non_snake_case, reason = "H, P, S, K are the letters of every textbook; NOTATION.md has the table")]
 pub(crate) fn update<T: Scalar, const N: usize, const L: usize>(
@@ -250,7 +250,7 @@ pub(crate) fn update<T: Scalar, const N: usize, const L: usize>(
     Ok((Belief { mean, covariance }, update))
 }
 
-/// `A - (A Hᵀ) Kᵀ + K R Kᵀ` with `A = (I - K H) P`, in the lower triangle; right for any K, the best or not.
+/// `A - (A Hᵀ) Kᵀ + K R Kᵀ` with `A = (I - K H) P`, in the lower triangle; valid for any K, optimal or not.
 #[allow(non_snake_case, reason = "as in `update`")]
 pub(crate) fn joseph<T: Scalar, const N: usize, const L: usize>(
     P: &Symmetric<T, N, L>,

@@ -1,6 +1,6 @@
 use core::fmt;
 
-/// Reason for refusing a step. The belief that was passed in is still the best there is.
+/// Reason for rejecting a step. The belief passed in is still the best available.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -8,28 +8,29 @@ use core::fmt;
 pub enum StepError {
     /// The reading is NaN or infinite; a missing reading is `None`.
     NonFiniteReading,
-    /// The variance that a reading brings along is below zero.
+    /// The extra variance of a reading is negative.
     NegativeVariance,
     /// The time step is NaN or infinite.
     NonFiniteTimeStep,
     /// Time went backwards.
     NegativeTimeStep,
-    /// The innovation's variance is not a positive number: neither the state nor the reading has any uncertainty left,
-    /// or the belief passed in is no covariance.
+    /// The innovation variance is not a positive number: neither the state nor the reading has any uncertainty left, or
+    /// the belief's covariance is not positive semi-definite.
     NonPositiveInnovationVariance,
     /// The new state would not be finite: the belief or the model's parameters are far out of range.
     NonFiniteState,
-    /// The model's gauge curve is not of the family that the filter was made for.
+    /// The model's gauge curve is not of the family for which the filter was built.
     OtherGauge,
-    /// The estimator cannot look back.
+    /// The estimator has no smoother.
     NoSmoother,
-    /// The rested sensor cannot read that: it is beyond [`FARTHEST_REST`](crate::live::FARTHEST_REST) times what it read in
-    /// calibration, or below one part in that.
+    /// The reading at rest is implausible: it differs from that of the calibration by more than a factor of
+    /// [`FARTHEST_REST`](crate::live::FARTHEST_REST).
     ImplausibleRest,
 }
 
 impl StepError {
-    /// True if the same step without its reading may well succeed: the reading is too far away, or too exact, for the numbers.
+    /// True if the same step without its reading may succeed: the reading is too far away, or too exact, for the
+    /// floating-point precision.
     #[must_use]
     pub const fn is_of_the_reading(self) -> bool {
         matches!(self, Self::NonFiniteState | Self::NonPositiveInnovationVariance)

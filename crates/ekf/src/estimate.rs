@@ -7,7 +7,7 @@ use crate::{Belief, Gaussian, Real, State};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Estimate<T> {
-    /// Strain, its mean moved into the limits.
+    /// Strain, its mean clamped to the limits.
     pub strain: Gaussian<T>,
     /// Strain rate, 1/s.
     pub rate: Gaussian<T>,
@@ -15,43 +15,44 @@ pub struct Estimate<T> {
     pub relaxation: Gaussian<T>,
     /// Baseline, relative to R₀; zero where the model has none.
     pub baseline: T,
-    /// R/R₀ - 1 of the sensor if it stands still at this moment: g(ε), branches and baseline over all hypotheses. In a hold it
-    /// is what is read.
+    /// R/R₀ - 1 of the sensor without its rate term: g(ε), branches and baseline over all hypotheses. In a hold it is the
+    /// expected reading.
     pub held: Gaussian<T>,
-    /// Amount by which that will fall if the strain is held from now on, see [`Settling`].
+    /// Amount by which `held` will fall if the strain is held from now on; see [`Settling`].
     pub still_relaxes: Gaussian<T>,
     /// Probability that the strain is beyond the static border, where one reading belongs to two strains; zero where
     /// the gauge curve has no peak in its range.
     pub beyond_border: T,
     /// True if the *ramp* border is near: the strain at which the reading, at the present speed, stops rising or falling
-    /// though the body goes on. The static border limits what a reading tells at rest, the ramp border what it tells in motion.
+    /// although the body keeps moving. The static border limits the information in a reading at rest, the ramp border that in
+    /// motion.
     pub near_ramp_border: bool,
 }
 
 /// Relaxation of the readings while the strain is held.
 ///
-/// The branches of the law predict by how much a reading will have fallen after `horizon_s`. A `share` of that comes true: laws are
-/// fitted to motion and to drift, and their slow branches absorb more than relaxation. The prediction's error grows with the
-/// relaxation that is left.
+/// The branches of the law predict the fall of a reading within `horizon_s`. Only a `share` of it occurs: laws are fitted to motion
+/// and to drift, and their slow branches absorb more than relaxation. The prediction's error grows with the remaining relaxation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Settling<T> {
     /// Time for which the strain is held, s.
     pub horizon_s: T,
-    /// Share of the branches' relaxation that comes true.
+    /// Fraction of the branches' predicted relaxation that occurs.
     pub share: T,
     /// Its standard deviation.
     pub share_sd: T,
-    /// Standard deviation of what does not grow with the relaxation, relative to R₀.
+    /// Standard deviation of the part that does not grow with the relaxation, relative to R₀.
     pub sd: T,
 }
 
-/// Hold, s, of a sensor without holds in its calibration.
+/// Assumed duration of a hold, s, for a sensor without holds in its calibration.
 const UNSEEN_HORIZON_S: f64 = 60.0;
 
 impl<T: Real> Settling<T> {
-    /// Settling of a sensor whose holds were not seen: any share is as likely as another, and branches and baseline wander.
+    /// Returns the settling of a sensor without calibrated holds: a uniformly distributed share, and the wander of branches
+    /// and baseline.
     #[must_use]
     pub fn unseen(noise: &ModelNoise<T>, branches: usize) -> Self {
         let wander = noise.baseline_sd * noise.baseline_sd + T::of(branches as f64) * noise.branch_sd * noise.branch_sd;
@@ -71,8 +72,8 @@ impl<T: Real> Settling<T> {
 }
 
 impl<T: Real> Estimate<T> {
-    /// The estimate that a state stands for. `limits` act on the reported strain only, the state goes on unrestricted;
-    /// `strain_sd_scale` multiplies the strain's standard deviation (1 for none), as a calibration found it necessary.
+    /// Returns the estimate of a state. `limits` act on the reported strain only; the state is not restricted.
+    /// `strain_sd_scale` multiplies the strain's standard deviation (1 for no effect); calibration determines it.
     #[must_use]
     pub fn new<S: State<T, N, L>, const B: usize, const N: usize, const L: usize>(
         model: &SwitchedModel<T, B, N>,
@@ -110,8 +111,8 @@ impl<T: Real> Estimate<T> {
         }
     }
 
-    /// Returns R/R₀ - 1 after the strain has been held from now on, predicted from the state alone. Where there is a reading, the reading
-    /// minus [`Self::still_relaxes`] is the better prediction: it contains the law's errors up to now.
+    /// Returns the settled R/R₀ - 1 if the strain is held from now on, predicted from the state alone. If there is a reading, the
+    /// reading minus [`Self::still_relaxes`] is the better prediction, because it contains the law's errors up to now.
     #[must_use]
     pub fn settled(&self) -> Gaussian<T> {
         let (held, falls) = (self.held, self.still_relaxes);
@@ -119,7 +120,7 @@ impl<T: Real> Estimate<T> {
     }
 }
 
-/// R/R₀ - 1 at rate zero. Its parts are known much worse than their sum, which is what is read.
+/// Returns R/R₀ - 1 at rate zero. Its terms are much less certain than their sum, which is the reading.
 fn standing_still<T: Real, const B: usize, const N: usize, const L: usize>(
     model: &SwitchedModel<T, B, N>,
     belief: &Belief<T, N, L>,
@@ -147,7 +148,7 @@ fn relaxes_within<T: Real, const B: usize, const N: usize, const L: usize>(
         .fold(T::zero(), |sum, (i, branch)| sum - belief.mean[MOTION_STATES + i] * (-horizon_s / branch.tau_s).exp_m1())
 }
 
-/// Sum of the branches.
+/// Returns the sum of the branches.
 fn relaxation<T: Scalar, const B: usize, const N: usize, const L: usize>(belief: &Belief<T, N, L>) -> Gaussian<T> {
     let (mut mean, mut variance) = (T::zero(), T::zero());
     for i in MOTION_STATES..MOTION_STATES + B {
@@ -159,11 +160,11 @@ fn relaxation<T: Scalar, const B: usize, const N: usize, const L: usize>(belief:
     Gaussian { mean, variance: variance.max(T::zero()) }
 }
 
-/// Deviations to each side within which a strain is looked for.
+/// Half width of the strain interval searched for a ramp border, in standard deviations.
 const NEAR: f64 = 2.0;
 
-/// True if the reading has an extremum along the present movement, dρ/dt = 0, within two deviations of the strain. A body
-/// whose rate cannot be told from zero is on no ramp.
+/// True if the reading has an extremum along the present movement, dρ/dt = 0, within two standard deviations of the
+/// strain. A body whose rate is indistinguishable from zero is on no ramp.
 fn near_ramp_border<T: Scalar, const B: usize, const N: usize, const L: usize>(
     model: &SwitchedModel<T, B, N>,
     belief: &Belief<T, N, L>,
@@ -182,7 +183,7 @@ fn near_ramp_border<T: Scalar, const B: usize, const N: usize, const L: usize>(
 }
 
 impl<T: Scalar> Gaussian<T> {
-    /// One component of a belief by itself.
+    /// Returns the marginal distribution of one component of a belief.
     #[must_use]
     pub fn marginal<const N: usize, const L: usize>(belief: &Belief<T, N, L>, index: usize) -> Self {
         Self { mean: belief.mean[index], variance: belief.covariance[(index, index)].max(T::zero()) }

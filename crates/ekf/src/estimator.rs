@@ -2,32 +2,32 @@ use ohmstrain_model::Scalar;
 
 use crate::{Belief, Gaussian, Reading, StepError};
 
-/// Common interface of all estimators: a state that a prepared step turns into the next one.
+/// Common interface of all estimators: a prepared step maps a state to the next one.
 ///
-/// The estimator is configuration, the state is the caller's; an error leaves it as it was. Outlier guards
+/// The estimator is configuration, and the state belongs to the caller; an error leaves the state unchanged. Outlier guards
 /// ([`Guard`](crate::Guard)) and smoothing of past steps ([`smooth_back_through`](crate::smooth_back_through)) work on any of
 /// them.
 pub trait Estimator<T: Scalar, const N: usize, const L: usize> {
     /// State carried from step to step.
     type State: State<T, N, L>;
-    /// Values that depend on the length of a step only.
+    /// Values that depend only on the length of a step.
     type Prepared: Copy;
 
     /// Prepares steps of `dt_s ≥ 0` seconds.
     fn prepare(&self, dt_s: T) -> Self::Prepared;
 
-    /// The longest step, s, over which a prediction is as good as many short ones; [`Substeps`](crate::Substeps) divides longer
-    /// ones. Infinite by default.
+    /// Longest step, s, over which one prediction is as accurate as many short ones; [`Substeps`](crate::Substeps) divides
+    /// longer steps. Infinite by default.
     fn longest_step_s(&self) -> T {
         T::one() / T::zero()
     }
 
-    /// Length, s, of the step that is prepared for one of `dt_s`: that itself, unless steps that differ by rounding are one.
+    /// Length, s, of the step prepared for `dt_s`: `dt_s` itself, unless lengths that differ only by rounding are merged.
     fn length_s(&self, dt_s: T) -> T {
         dt_s
     }
 
-    /// Predicts over a prepared step, then takes the reading; without one it is a prediction.
+    /// Predicts over a prepared step, then takes the reading, if there is one.
     ///
     /// # Errors
     /// See [`StepError`].
@@ -38,8 +38,8 @@ pub trait Estimator<T: Scalar, const N: usize, const L: usize> {
         reading: Option<Reading<T>>,
     ) -> Result<Advanced<Self::State, T>, StepError>;
 
-    /// [`Self::advance`] into a state that is there already, whatever it was: nothing need be moved. After an error it means
-    /// nothing.
+    /// Writes the result of [`Self::advance`] into an existing state, which saves a move. After an error that state is
+    /// meaningless.
     ///
     /// # Errors
     /// See [`StepError`].
@@ -55,11 +55,11 @@ pub trait Estimator<T: Scalar, const N: usize, const L: usize> {
         Ok(innovation)
     }
 
-    /// One step backwards: the state at time k given all readings, from `filtered` at k, the step that led from there to
-    /// k+1, and `next`, the state at k+1 given all readings. `None` if the estimator has no smoother.
+    /// Smooths one step backwards. Returns the state at time k given all readings, from `filtered` at k, the step from k
+    /// to k+1, and `next`, the smoothed state at k+1. `None` if the estimator has no smoother.
     ///
     /// # Errors
-    /// See [`StepError`]; a step that went forward goes backward.
+    /// See [`StepError`]; a step that succeeded forward also succeeds backward.
     fn smooth_back(
         &self,
         _filtered: &Self::State,
@@ -73,34 +73,36 @@ pub trait Estimator<T: Scalar, const N: usize, const L: usize> {
 
 /// State that an estimator carries from step to step.
 pub trait State<T: Scalar, const N: usize, const L: usize>: Clone {
-    /// The Gaussian with its mean and covariance.
+    /// Returns the Gaussian with the mean and covariance of the state.
     fn moments(&self) -> Belief<T, N, L>;
 
-    /// Mean and variance of one of its components.
+    /// Returns mean and variance of one component.
     fn marginal(&self, index: usize) -> Gaussian<T> {
         let belief = self.moments();
         Gaussian { mean: belief.mean[index], variance: belief.covariance[(index, index)] }
     }
 
-    /// Visits what the state is a mixture of: weights that sum to one, and Gaussians.
+    /// Visits the components of the mixture: weights that sum to one, and Gaussians.
     fn each(&self, visit: &mut dyn FnMut(T, &Belief<T, N, L>));
 
     /// Probability of each phase, in the order of [`Phase::ALL`](ohmstrain_model::Phase::ALL); `None` if the estimator
     /// has no phases.
     fn phases(&self) -> Option<[T; 3]>;
 
-    /// Returns the same state with less confidence: covariances times `factor`.
+    /// Returns the same state with its covariances multiplied by `factor`.
     #[must_use]
     fn inflated(&self, factor: T) -> Self;
 
-    /// Returns the state with another one beside it that has `share` of the weight, 0 to 1, from which a filter that has lost its
-    /// way may find it. In a filter of hypotheses it gets a free place or that of the lightest; a state without room for another stays as it is.
+    /// Returns the state with another one added, which gets `share` of the weight, 0 to 1, so that a filter that has diverged can
+    /// recover. In a mixture it takes a free slot, or that of the hypothesis of least weight; a state without slots is returned
+    /// unchanged.
     #[must_use]
     fn beside(&self, _other: &Self, _share: T) -> Self {
         self.clone()
     }
 
-    /// Returns the state, of which steps keep at most that many hypotheses; a state that is no mixture stays as it is.
+    /// Returns the state limited to that many hypotheses in further steps; a state that is not a mixture is returned
+    /// unchanged.
     #[must_use]
     fn keeping(self, _most: usize) -> Self {
         self
@@ -123,10 +125,10 @@ pub struct Advanced<S, T> {
 pub struct Innovation<T> {
     /// Reading minus expected reading.
     pub value: T,
-    /// Its variance.
+    /// Variance of the innovation.
     pub variance: T,
     /// Normalised innovation squared: χ² with one degree of freedom if the estimator is consistent.
     pub nis: T,
-    /// Log density of the reading before it was seen, constant included.
+    /// Predictive log density of the reading, including the constant.
     pub log_likelihood: T,
 }

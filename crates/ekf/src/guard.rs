@@ -2,14 +2,14 @@ use ohmstrain_model::{Number, ParameterError, Problem, Scalar};
 
 use crate::{Advanced, Estimator, Innovation, Reading, State, StepError};
 
-/// Protects an estimator from outliers: a gate that turns readings down, and a bounded influence for those it lets pass.
+/// Protects an estimator from outliers: a gate rejects readings, and readings that pass it have a bounded influence.
 ///
-/// A gate alone can lock a filter out: one wrong rejection, and every later reading looks wrong too. After `patience`
-/// rejections in a row it may be the state that is wrong. Its covariance is then inflated just so much that the reading comes
-/// to lie on the gate, tenfold at most and three times at most until one passes by itself: what the filter has learnt of drift
-/// and relaxation shall survive. A reading that is still beyond the gate is taken with Huber's weight.
+/// A gate alone can lock a filter out: after one wrong rejection, every later reading may look wrong too. After `patience`
+/// rejections in a row, the state itself may be wrong. Its covariance is then inflated just enough for the reading to lie on
+/// the gate, at most tenfold, and at most three times until a reading passes by itself. The limits preserve the filter's
+/// estimates of drift and relaxation. A reading still beyond the gate is taken with Huber's weight.
 ///
-/// A reading that the numbers cannot take, far away or overflowing, is turned down and never an error, with a gate or without.
+/// A reading too far away for floating-point numbers is rejected, with or without a gate; it is never an error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Guard<T> {
     gate: T,
@@ -29,14 +29,14 @@ pub enum Influence<T> {
         /// Number of standard deviations; 1.345 costs 5 % of efficiency on Gaussian readings.
         threshold: T,
     },
-    /// The full gain up to `threshold` standard deviations, and less the farther beyond: an innovation of z moves the
-    /// state by threshold²/z. It costs nothing while nothing surprises, and a far outlier counts for next to nothing. A
-    /// redescending influence (Hampel, *J. Am. Stat. Assoc.* 69 (1974) 383), with the tail of Student's t.
+    /// The full gain up to `threshold` standard deviations, and less beyond: an innovation of z standard deviations
+    /// counts as threshold²/z. It has no cost without outliers, and a far outlier has almost no effect. A redescending
+    /// influence (Hampel, *J. Am. Stat. Assoc.* 69 (1974) 383), with the tail of Student's t.
     Redescending {
         /// Number of standard deviations.
         threshold: T,
     },
-    /// Innovations as of Student's t distribution: the weight `(ν + 1)/(ν + NIS)` falls toward zero for large ones (Lange,
+    /// Innovations with Student's t distribution: the weight `(ν + 1)/(ν + NIS)` falls toward zero for large ones (Lange,
     /// Little, Taylor, *J. Am. Stat. Assoc.* 84 (1989) 881), and never exceeds one.
     StudentT {
         /// ν, above zero; 4 is usual.
@@ -51,18 +51,18 @@ pub enum Influence<T> {
 pub enum ReadingVerdict {
     /// Missing reading.
     Missing,
-    /// Taken as it is.
+    /// Taken with its full weight.
     Accepted,
-    /// Taken with less weight.
+    /// Taken with reduced weight.
     Downweighted,
-    /// Turned down; the step was a prediction.
+    /// Rejected; the step was a prediction.
     Rejected,
-    /// Taken with the influence of one on the gate, and the state's confidence lowered, because too many in a row were turned
-    /// down.
+    /// Taken with the influence of a reading on the gate, after the state's covariance was inflated, because too many in a
+    /// row were rejected.
     Readmitted,
-    /// Nothing that this sensor can read: no reading at all, however often it comes.
+    /// Not a possible reading of this sensor; ignored, however often it comes.
     Implausible,
-    /// The same number for longer than a working sensor repeats itself; it carries no new information.
+    /// The same number for longer than a working sensor repeats it; it carries no new information.
     Stuck,
 }
 
@@ -73,14 +73,14 @@ impl ReadingVerdict {
         matches!(self, Self::Accepted | Self::Downweighted | Self::Readmitted)
     }
 
-    /// True for a reading that the sensor could give and that was not used. One that no sensor gives is as good as missing.
+    /// True for a possible reading that was not used. An implausible reading counts as missing instead.
     #[must_use]
     pub const fn is_refused(self) -> bool {
         matches!(self, Self::Rejected | Self::Stuck)
     }
 }
 
-/// Rejections in a row; the caller keeps it beside the state.
+/// Number of rejections in a row, stored by the caller beside the state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -89,12 +89,12 @@ pub struct Streak(u32);
 /// A step under guard.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Guarded<S, T> {
-    /// The step that was taken; its innovation is that of the reading as it came, `None` if that was too far away to have one.
+    /// The step that was taken. Its innovation is that of the original reading; `None` if that was too far away to have one.
     pub advanced: Advanced<S, T>,
-    /// Factor on the covariance of the state from which the step was taken ([`State::inflated`]), for a smoother; 1 but at a
+    /// Factor on the covariance of the state before the step ([`State::inflated`]), for a smoother; 1 except at a
     /// readmission.
     pub inflation: T,
-    /// The reading as it was used.
+    /// Reading as used, with its extra variance.
     pub used: Option<Reading<T>>,
     /// Verdict on the reading.
     pub verdict: ReadingVerdict,
@@ -102,22 +102,22 @@ pub struct Guarded<S, T> {
     pub streak: Streak,
 }
 
-/// Growth of the covariance per readmission, at most, and how often in a row.
+/// Largest growth of the covariance per readmission. The constant below is the largest number of inflations in a row.
 const MOST_INFLATION: f64 = 10.0;
 const MOST_INFLATIONS: u32 = 3;
 
 impl<T: Scalar> Guard<T> {
-    /// A guard that lets everything pass.
+    /// Returns a guard that accepts every reading.
     #[must_use]
     pub fn none() -> Self {
         Self { gate: T::one() / T::zero(), influence: Influence::Full, patience: 0 }
     }
 
-    /// Turns down readings with a normalised innovation squared above `nis`, `patience` of them in a row at most.
-    /// χ² with one degree of freedom exceeds 10.8 once in a thousand.
+    /// Rejects readings with a normalised innovation squared above `nis`, at most `patience` of them in a row. χ² with
+    /// one degree of freedom exceeds 10.8 once in a thousand.
     ///
     /// # Errors
-    /// If `nis` is not above zero.
+    /// If `nis` is not positive.
     pub fn with_gate(self, nis: T, patience: u32) -> Result<Self, ParameterError> {
         if !(nis > T::zero()) {
             return Err(ParameterError::new("gate", Problem::NotPositive));
@@ -128,7 +128,7 @@ impl<T: Scalar> Guard<T> {
     /// Bounds the influence of the readings that pass the gate.
     ///
     /// # Errors
-    /// If its parameter is not above zero.
+    /// If its parameter is not positive.
     pub fn with_influence(self, influence: Influence<T>) -> Result<Self, ParameterError> {
         let (name, value) = match influence {
             Influence::Full => return Ok(Self { influence, ..self }),
@@ -141,10 +141,10 @@ impl<T: Scalar> Guard<T> {
         Ok(Self { influence, ..self })
     }
 
-    /// A step of `estimator` under guard.
+    /// Advances `estimator` under guard.
     ///
     /// # Errors
-    /// See [`StepError`]; state and streak are the caller's and stay as they were.
+    /// See [`StepError`]; the caller's state and streak are unchanged.
     pub fn advance<E: Estimator<T, N, L>, const N: usize, const L: usize>(
         &self,
         estimator: &E,
@@ -170,7 +170,7 @@ impl<T: Scalar> Guard<T> {
         };
         let Some((plain, innovation)) = seen else { return rejected() };
         let nis = innovation.nis;
-        // A NIS that is not a number, or below zero, must not pass.
+        // A NIS that is NaN or negative must not pass.
         if nis >= T::zero() && nis <= self.gate {
             let weight = self.influence.weight(nis);
             if weight >= T::one() {
@@ -196,7 +196,8 @@ impl<T: Scalar> Guard<T> {
     }
 }
 
-/// The step with a reading as it is, and its innovation; `None` if the numbers cannot take the reading.
+/// Returns the step with the unchanged reading, and its innovation; `None` if floating-point numbers cannot represent
+/// the result.
 #[allow(clippy::type_complexity, reason = "a state with what it was compared with")]
 fn taken_as<T: Scalar, E: Estimator<T, N, L>, const N: usize, const L: usize>(
     estimator: &E,
@@ -214,7 +215,7 @@ fn taken_as<T: Scalar, E: Estimator<T, N, L>, const N: usize, const L: usize>(
 }
 
 impl<T: Number> Influence<T> {
-    /// Weight of an innovation with this square in its variances, 0 to 1.
+    /// Returns the weight, 0 to 1, of an innovation with this normalised square.
     pub fn weight(&self, nis: T) -> T {
         match *self {
             Self::Full => T::one(),

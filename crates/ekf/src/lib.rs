@@ -1,11 +1,11 @@
 //! Kalman-type filters and smoothers for a scalar reading of a hidden state.
 //!
-//! Configuration and state are apart: an estimator ([`Ekf`]) holds the model, a [`Belief`] goes in and a [`Step`] with
-//! a new belief comes out. An error leaves the caller's belief as it was, and one estimator serves many sensors.
+//! Configuration and state are separate: an estimator ([`Ekf`]) holds the model, takes a [`Belief`], and returns a
+//! [`Step`] with a new belief. An error leaves the caller's belief unchanged, and one estimator serves many sensors.
 //!
 //! [`Ekf`] keeps one Gaussian and has a smoother. [`Imm`], [`SignSplit`] and
-//! [`Hypotheses`] keep a [`Mixture`] of hypotheses about the phase, because stretching and releasing look alike.
-//! [`correction`] improves a calibrated filter's strain by a correction learned in calibration.
+//! [`Hypotheses`] keep a [`Mixture`] of hypotheses about the phase, because the readings of stretching and releasing
+//! can look alike. [`correction`] improves a calibrated filter's strain with a correction learned in calibration.
 //!
 //! For a model of your own, [`kalman`] has linear, extended and unscented filters, smoothers and maximum likelihood.
 //!
@@ -15,19 +15,19 @@
 //! # Policy
 //! - `no_std`, no heap, no unsafe code, no panic.
 //! - A missing reading is a prediction. A step of zero seconds is an update without a prediction. A NaN or infinite
-//!   reading, a negative step and a variance that is not positive are [`StepError`]s.
-//! - Everything computed is returned: prior, innovation, its variance, log-likelihood, gain.
-//! - Covariances are packed symmetric, so they are symmetric by construction, and are updated in Joseph's form, except in the
-//!   filters on the kernel, whose docs mention it.
+//!   reading, a negative step and an innovation variance that is not positive are [`StepError`]s.
+//! - All computed values are returned: prior, innovation, its variance, log-likelihood, gain.
+//! - Covariances are stored as packed triangles, so they are symmetric by construction. They are updated in Joseph's form,
+//!   except in filters on the kernel, whose docs say so.
 //!
 //! # Features
-//! `dual` finds Jacobians of a model in [`kalman`]; `simd` steps four hypotheses at once where the processor has AVX2, or WebAssembly
-//! its vectors; `adskalman` hands linearised steps to that crate. Off by default and
-//! without std:
+//! `dual` computes Jacobians of a model in [`kalman`]. `simd` steps four hypotheses at once on processors with AVX2, or in
+//! WebAssembly with vectors. `adskalman` passes linearised steps to that crate. All features are off by default. The following
+//! work without std:
 //! - `serde`: [`Belief`], mixtures, [`Estimate`], [`Gaussian`], readings, innovations, verdicts of readings and errors as plain data;
-//!   and [`live::Memory`], the whole state of a running filter. A belief that comes back is not checked; a step that it cannot take is
-//!   refused. Values made by constructors that check are left out.
-//! - `defmt`: `Format` for beliefs and what goes with them, but not for mixtures. It takes no text from the target, only numbers.
+//!   and [`live::Memory`], the whole state of a running filter. A deserialised belief is not checked; a step that is impossible
+//!   from it is rejected. Types whose constructors validate are left out.
+//! - `defmt`: `Format` for beliefs and related types, but not for mixtures. The target sends only numbers, no text.
 //!
 //! ```
 //! use ohmstrain_ekf::{Ekf, Reading, Start};

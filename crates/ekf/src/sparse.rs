@@ -1,10 +1,10 @@
-//! The sensor's own filter as an estimator, which goes backwards, too.
+//! The sensor's own filter as an [`Estimator`], with a smoother.
 
 use ohmstrain_model::Scalar;
 
 use crate::{Advanced, Belief, Curve, Estimator, Reading, SparseEkf, StepError, Switch, rts_step};
 
-/// The prepared step is the filter itself, made for that length.
+/// The prepared step is the filter itself for steps of that length.
 impl<T, S, const B: usize, const N: usize, G, const L: usize> Estimator<T, N, L> for SparseEkf<T, S, B, N, G>
 where
     T: Scalar,

@@ -2,14 +2,14 @@ use ohmstrain_model::Scalar;
 
 use crate::{Advanced, Estimator, Innovation, Reading, StepError};
 
-/// An estimator that takes a long step as several short ones.
+/// An estimator that divides a long step into several short ones.
 ///
 /// The estimator determines the longest step ([`Estimator::longest_step_s`]); the steps of a long pause grow with it
 /// ([`Pause`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Substeps<E>(pub E);
 
-/// A prepared way over a pause: whole steps, as many as `count`, and the last steps, which are alike.
+/// The prepared steps of a pause: whole steps, and `count` last steps of equal length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Repeated<P, T> {
     before: Pause<T>,
@@ -19,34 +19,35 @@ pub struct Repeated<P, T> {
 }
 
 impl<P, T: Copy> Repeated<P, T> {
-    /// The pause that it leads over, as the estimator tells it apart.
+    /// Returns the pause that it covers, with lengths merged by the estimator.
     pub const fn pause(&self) -> Pause<T> {
         self.before
     }
 }
 
-/// Tolerance of rounding, so that a step of the longest length is one step.
+/// Tolerance for rounding, so that a step of the longest length remains one step.
 pub const GRACE: f64 = 1.0005;
-/// Largest number of steps of the longest length up to which a pause is divided evenly.
+/// Largest pause, in longest steps, that is divided evenly.
 pub const EVENLY: f64 = 4.0;
-/// A step that is not of the longest length is no longer than this share of the pause that has passed: steps of 2 s within the first
-/// minute left the branches' mean half a deviation off.
+/// Largest step longer than the longest length, as a fraction of the time passed in the pause. Steps of 2 s within the first minute
+/// left an error of half a standard deviation in the branches' mean.
 const SHARE: f64 = 1.0 / 64.0;
-/// Steps grow by this factor: few lengths, so that a program can have them in a table.
+/// Growth factor of steps, which yields few lengths, so that a program can tabulate them.
 pub const GROWTH: f64 = 4.0;
-/// The longest pause that is divided, s: twelve days. A longer one leaves as little.
+/// Longest pause that is divided, s: twelve days. A longer one leaves no more information.
 pub const LONGEST_PAUSE_S: f64 = 1_048_576.0;
 
-/// The time since the last reading, divided into steps.
+/// Time since the last reading, divided into steps.
 ///
-/// The division depends on that time alone: 256 steps of the longest length L, then 192 of 4 L, of 16 L and so on; what remains is divided into the same lengths, the longest first, and one that is not longer
-/// than L. So a pause may be one row, or many rows without a reading.
+/// The division depends only on that time: 256 steps of the longest length L, then 192 of 4 L, of 16 L and so on. The remainder is
+/// divided into the same lengths, the longest first, and a few equal steps of at most L. A pause may therefore be one row, or many
+/// rows without a reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Pause<T> {
-    /// L, s.
+    /// Longest length L, s.
     longest_s: T,
-    /// Time that has been passed in whole steps, in L.
+    /// Time passed in whole steps, in units of L.
     passed: T,
     /// Time since then, s.
     ahead_s: T,
@@ -64,7 +65,7 @@ impl<T: Scalar> Pause<T> {
         Self { longest_s, passed: T::zero(), ahead_s: T::zero() }
     }
 
-    /// The pause `dt_s` seconds later.
+    /// Returns the pause `dt_s` seconds later.
     #[must_use]
     pub fn after(self, dt_s: T) -> Self {
         let (ahead_s, most) = (self.ahead_s + dt_s, T::of(LONGEST_PAUSE_S));
@@ -72,7 +73,7 @@ impl<T: Scalar> Pause<T> {
         Self { ahead_s: if is_too_long { most } else { ahead_s }, ..self }
     }
 
-    /// Time that has not been passed in whole steps, s.
+    /// Returns the time not yet passed in whole steps, s.
     pub const fn ahead_s(&self) -> T
     where
         T: Copy,
@@ -80,13 +81,13 @@ impl<T: Scalar> Pause<T> {
         self.ahead_s
     }
 
-    /// Passes a whole step: its length, s, or `None` where less than that is ahead.
+    /// Passes a whole step, and returns its length, s; `None` if less than that is ahead.
     pub fn whole_step(&mut self) -> Option<T> {
         let times = self.times();
         self.exceeds(times).then(|| self.pass(times))
     }
 
-    /// Passes a step, one of those that remain; its length, s, or `None` where only the even ones are ahead.
+    /// Passes a step of the remainder, and returns its length, s; `None` if only the even ones are ahead.
     pub(crate) fn step_before_last(&mut self) -> Option<T> {
         let mut times = self.times();
         while !self.exceeds(times) {
@@ -98,13 +99,13 @@ impl<T: Scalar> Pause<T> {
         Some(self.pass(times))
     }
 
-    /// The even steps: how many, and their length, s.
+    /// Returns the number of even steps, and their length, s.
     #[must_use]
     pub fn last_steps(&self) -> (u8, T) {
         let (mut count, mut counted) = (1, T::one());
         let more = self.longest_s * T::of(GRACE);
         let mut covered = more;
-        // Counted twice, since a conversion would take double precision.
+        // Counted in two types, because a conversion would need double precision.
         while covered < self.ahead_s && counted < T::of(EVENLY) {
             covered += more;
             count += 1;
@@ -113,7 +114,7 @@ impl<T: Scalar> Pause<T> {
         (count, self.ahead_s / counted)
     }
 
-    /// Lengths of all steps that are ahead, s.
+    /// Returns the lengths of all steps ahead, s.
     pub(crate) fn steps(mut self) -> impl Iterator<Item = T> {
         let mut even = None;
         core::iter::from_fn(move || {
@@ -128,13 +129,13 @@ impl<T: Scalar> Pause<T> {
         })
     }
 
-    /// True if more is ahead than such a step, or, of the longest length, than even steps.
+    /// True if more is ahead than a step of `times` L or, for the longest length itself, than the even steps.
     fn exceeds(&self, times: T) -> bool {
         let least = if times > T::one() { times } else { T::of(EVENLY) };
         self.ahead_s > least * self.longest_s * T::of(GRACE)
     }
 
-    /// Length of a whole step, in L.
+    /// Returns the length of a whole step, in units of L.
     fn times(&self) -> T {
         let (mut times, growth) = (T::one(), T::of(GROWTH));
         while times * growth <= self.passed * T::of(SHARE) {
@@ -161,7 +162,7 @@ impl<E> Substeps<E> {
         Pause::none(self.0.longest_step_s())
     }
 
-    /// A pause without whole steps as the estimator tells it apart from others ([`Estimator::length_s`]).
+    /// Returns a pause without whole steps, with a length merged by the estimator ([`Estimator::length_s`]).
     pub fn told_apart<T, const N: usize, const L: usize>(&self, pause: Pause<T>) -> Pause<T>
     where
         T: Scalar,
@@ -171,7 +172,7 @@ impl<E> Substeps<E> {
         if has_whole { pause } else { Pause { ahead_s: self.0.length_s(pause.ahead_s), ..pause } }
     }
 
-    /// Prepares the way over what is ahead of a pause.
+    /// Prepares the steps ahead in a pause.
     pub fn prepare_over<T, const N: usize, const L: usize>(&self, pause: Pause<T>) -> Repeated<E::Prepared, T>
     where
         T: Scalar,
@@ -189,7 +190,7 @@ impl<E> Substeps<E> {
         Repeated { before: pause, count, last: self.0.prepare(length_s), last_count }
     }
 
-    /// Prepares the way over the whole steps of a pause, for a smoother; `None` where there is none.
+    /// Prepares the whole steps of a pause, for a smoother; `None` if there are none.
     pub fn prepare_whole<T, const N: usize, const L: usize>(&self, pause: Pause<T>) -> Option<Repeated<E::Prepared, T>>
     where
         T: Scalar,
@@ -241,7 +242,7 @@ impl<E> Substeps<E> {
         Ok(())
     }
 
-    /// One step backwards over all that remain.
+    /// Smooths backwards over the remaining steps.
     fn smooth_back_over<T, const N: usize, const L: usize>(
         &self,
         filtered: &E::State,
@@ -264,7 +265,8 @@ impl<E> Substeps<E> {
             let Some(between) = self.smooth_back_over(&middle, &later, reading, next)? else { return Ok(None) };
             return self.smooth_back_over(filtered, &sooner, None, &between);
         }
-        // Half of them forward, the rest backward, then the first half: few states at a time.
+        // The first half forward, the rest backward, then the first half backward, so that few states are held at a
+        // time.
         let first = prepared.count.div_ceil(2);
         let (mut middle, mut rest, mut last_s) = (filtered.clone(), prepared.before, T::zero());
         let mut left = first;
@@ -339,7 +341,7 @@ mod tests {
 
     use super::{GROWTH, LONGEST_PAUSE_S, Pause};
 
-    /// Lengths of all steps of a pause, in L, the last one included.
+    /// Returns the lengths of all steps of a pause, in L, including the last one.
     fn lengths(pause: Pause<f64>) -> Vec<f64> {
         pause.steps().map(|length_s| length_s / pause.longest_s).collect()
     }
@@ -354,7 +356,7 @@ mod tests {
             assert!((lengths.iter().sum::<f64>() * 0.1 - dt_s).abs() < 1e-9);
         }
         assert_eq!(lengths(Pause::none(f64::INFINITY).after(1e5)).len(), 1);
-        // 256 whole lengths, 192 more of each, and at most three of each of what remains.
+        // 256 steps of length L, 192 of each longer length, and at most three of each in the remainder.
         let most = |seconds: f64| 260.0 + 195.0 * (seconds / 0.1 / 256.0).log(GROWTH).ceil().max(0.0) + 1.0;
         for seconds in [60.0, 3600.0, 86_400.0, LONGEST_PAUSE_S] {
             let found = lengths(Pause::none(0.1).after(seconds));
@@ -369,7 +371,7 @@ mod tests {
         assert_eq!(lengths(Pause::none(0.1).after(f64::MAX)), lengths(Pause::none(0.1).after(LONGEST_PAUSE_S)));
     }
 
-    /// Many rows lead over the same steps as one.
+    /// Many rows take the same steps as one.
     #[test]
     fn a_pause_is_divided_alike_however_it_is_written_down() {
         for seconds in [0.05, 0.31, 7.0, 123.4, 5000.0] {

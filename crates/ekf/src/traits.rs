@@ -6,23 +6,22 @@ use crate::Belief;
 
 /// Model of the state's motion in time. `L = N (N + 1) / 2`.
 pub trait Dynamics<T: Scalar, const N: usize, const L: usize> {
-    /// Values that depend on the length of a step only.
+    /// Values that depend only on the length of a step.
     type Prepared: Copy;
 
     /// Prepares steps of `dt_s ≥ 0` seconds.
     fn prepare(&self, dt_s: T) -> Self::Prepared;
 
-    /// The longest step, s, over which [`Self::transition`] is as good as many short ones; infinite by
-    /// default.
+    /// Longest step, s, over which [`Self::transition`] is as accurate as many short ones; infinite by default.
     fn longest_step_s(&self) -> T {
         T::one() / T::zero()
     }
 
-    /// The transition over a prepared step, linearised at the belief's mean. `phase` is a hypothesis; with `None` the
-    /// model makes the best of the belief. Models of one phase ignore it.
+    /// Returns the transition over a prepared step, linearised at the belief's mean. `phase` is a hypothesis; with
+    /// `None` the model infers the direction from the belief. Models without phases ignore it.
     fn transition(&self, step: &Self::Prepared, from: &Belief<T, N, L>, phase: Option<Phase>) -> Transition<T, N, L>;
 
-    /// `F P Fᵀ + Q`. The default multiplies full matrices; a model that knows where its zeros are can do better.
+    /// Returns `F P Fᵀ + Q`. The default multiplies full matrices; a model with known zeros in F can be faster.
     fn propagate(&self, covariance: &Symmetric<T, N, L>, transition: &Transition<T, N, L>) -> Symmetric<T, N, L> {
         covariance.congruence(&transition.jacobian).plus(&transition.noise)
     }
@@ -30,7 +29,7 @@ pub trait Dynamics<T: Scalar, const N: usize, const L: usize> {
 
 /// Model of a scalar reading as a function of the state.
 pub trait Channel<T: Scalar, const N: usize, const L: usize> {
-    /// The reading expected at the belief's mean, its gradient and the variance of its noise; `phase` as for
+    /// Returns the reading expected at the belief's mean, its gradient and the variance of its noise; `phase` as for
     /// [`Dynamics::transition`].
     fn observe(&self, at: &Belief<T, N, L>, phase: Option<Phase>) -> Observation<T, N>;
 }
@@ -59,7 +58,7 @@ impl<T: Scalar, const B: usize, const N: usize, const L: usize> Dynamics<T, N, L
     }
 }
 
-/// The direction at the instant of a reading.
+/// Returns the direction at the time of a reading.
 fn at_reading<T: Scalar>(rate_variance: T) -> Direction<T> {
     Direction::Uncertain { rate_sd: rate_variance.max(T::zero()).sqrt(), persistence: T::one() }
 }
@@ -74,8 +73,7 @@ impl<T: Scalar, const B: usize, const N: usize, const L: usize> Channel<T, N, L>
     }
 }
 
-/// A reading with the variance that it brings along, from an analogue front end for instance; the channel's own
-/// variance is added to it.
+/// A reading with its own extra variance, for example from an analogue front end, which adds to the channel's variance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -87,20 +85,20 @@ pub struct Reading<T> {
 }
 
 impl<T: Number> Reading<T> {
-    /// Returns the reading with so much more noise that the innovation's variance S becomes S/w: the gain, and with it the step, is w
-    /// times as large.
+    /// Returns the reading with additional noise, so that the innovation variance S becomes S/w. The gain, and so the correction of
+    /// the state, is then w times as large.
     #[must_use]
     pub fn weighted(self, weight: T, variance: T) -> Self {
         Self { extra_variance: self.extra_variance + variance * (T::one() / weight - T::one()), ..self }
     }
 
-    /// Returns the reading with more noise, by a factor, if it is more exact than numbers of such a rounding allow beside a channel's own
-    /// `variance`; `None` if it is so far away that noise is of no use.
+    /// Returns the reading with its noise increased by a factor, for a reading too exact for floating-point numbers with this
+    /// `rounding`, given the channel's own `variance`; `None` if it is so far away that noise does not help.
     #[must_use]
     pub fn coarser(self, variance: T, rounding: T) -> Option<Self> {
-        // A relative reading of order one is not known better than this.
+        // Resolution of a relative reading of order one.
         let noise = self.extra_variance + variance + rounding * rounding;
-        // What is so far away that its square overflows is not too exact.
+        // A reading so far away that its square overflows is not just too exact.
         let is_near = (self.value * self.value / noise).is_finite();
         is_near.then(|| Self { extra_variance: T::of(COARSER) * noise, ..self })
     }

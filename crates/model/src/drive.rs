@@ -6,8 +6,8 @@ use crate::{Direction, Phase, Scalar, SwitchedModel, SwitchedStep, Transition};
 impl<T: Scalar, const B: usize, const N: usize> SwitchedModel<T, B, N> {
     /// Drives the branches by the motion: gain at mid-strain times mean rate over the step.
     ///
-    /// The noise of branch i is `γᵢ wᵢ + strain_pull · n_ε`, because its gain depends on the course of the motion, plus the noise of an
-    /// uncertain direction, which is one number for all branches.
+    /// The noise of branch i is `γᵢ wᵢ + strain_pull · n_ε`, because its gain depends on the path of the motion. The noise of an
+    /// uncertain direction, one number for all branches, is added.
     pub(crate) fn drive_branches<const L: usize>(
         &self,
         step: &SwitchedStep<T, B>,
@@ -19,14 +19,15 @@ impl<T: Scalar, const B: usize, const N: usize> SwitchedModel<T, B, N> {
         let mid_strain = (state[0] + out.mean[0]) / T::of(2.0);
         let push = self.push(direction);
         let (mut gain, mut strain_pull, mut jump) = ([T::zero(); B], [T::zero(); B], [T::zero(); B]);
-        // All branches are driven by about the same rate: what its direction leaves open is taken from the first.
+        // All branches are driven by about the same rate, so the variance due to its uncertain direction is taken from
+        // the first.
         let mut unexplained = T::zero();
         for i in 0..B {
             let mut unit_drive = response.drive_input[i] * push;
             for j in 0..M {
                 unit_drive += response.drive[i][j] * state[j];
             }
-            // The rate that, held over the step, drives the branch as much as the motion does.
+            // The constant rate over the step that drives the branch as much as the motion does.
             let reach_s = -response.decay_change[i] * self.law().branches[i].tau_s;
             if !(reach_s > T::zero()) {
                 continue; // a step of zero seconds

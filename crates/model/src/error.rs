@@ -1,6 +1,6 @@
 use core::fmt;
 
-/// A parameter that no model can have, by name.
+/// Name of an invalid parameter, and the problem with it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -17,9 +17,9 @@ pub struct ParameterError {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Problem {
-    /// NaN, or infinite where only a number will do.
+    /// NaN, or infinite where a finite number is required.
     NotFinite,
-    /// Zero or below where only a positive number will do.
+    /// Zero or negative where a positive number is required.
     NotPositive,
     /// Below zero.
     Negative,
@@ -42,7 +42,7 @@ impl fmt::Display for ParameterError {
 impl core::error::Error for ParameterError {}
 
 impl ParameterError {
-    /// Names a parameter and what is wrong with it.
+    /// Names a parameter and the problem with it.
     #[must_use]
     pub const fn new(parameter: &'static str, problem: Problem) -> Self {
         Self { parameter, problem }

@@ -1,7 +1,7 @@
 use crate::Scalar;
 use crate::error::{ParameterError, Problem};
 
-/// A reading in ohms with the standard deviation that the electronics give it.
+/// Reading in ohms, with its standard deviation due to the electronics.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -19,7 +19,7 @@ pub struct Ohms<T> {
 pub enum AdcCode<T> {
     /// A usable reading.
     Reading(Ohms<T>),
-    /// The code stands at an end of the scale: the resistance is somewhere beyond.
+    /// The code is at an end of the scale; the resistance may lie beyond.
     Saturated,
 }
 
@@ -42,7 +42,7 @@ pub struct Divider<T> {
     converter: Converter<T>,
 }
 
-/// A constant current through the sensor, its voltage amplified and converted.
+/// Constant current through the sensor; the voltage across it is amplified and converted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConstantCurrent<T> {
     ohm_per_code: T,
@@ -64,14 +64,14 @@ struct Converter<T> {
     code_sd: T,
 }
 
-/// A code as a number. Through `f32`, which holds 24 bits exactly: through `f64` a microcontroller without double precision
-/// would call software for every reading.
+/// Converts a code to a number, through `f32`, which holds 24 bits exactly. Through `f64`, a microcontroller without double
+/// precision would need software arithmetic for every reading.
 fn count<T: Scalar>(code: u32) -> T {
     nalgebra::convert(code as f32)
 }
 
 impl<T: Scalar> Converter<T> {
-    /// `noise_codes`: standard deviation of the converter's own noise; rounding to a code adds 1/12.
+    /// `noise_codes`: standard deviation of the converter's own noise; rounding to a code adds 1/12 to its square.
     fn new(bits: u32, noise_codes: T) -> Result<Self, ParameterError> {
         if !(1..=24).contains(&bits) {
             return Err(ParameterError::new("bits", Problem::OutOfRange));
@@ -94,7 +94,7 @@ impl<T: Scalar> Divider<T> {
     /// - `noise_codes`: standard deviation of the converter's noise, in codes.
     ///
     /// # Errors
-    /// Names the parameter that no divider can have.
+    /// Names the invalid parameter.
     pub fn new(reference_ohm: T, side: SensorSide, bits: u32, noise_codes: T) -> Result<Self, ParameterError> {
         if !(reference_ohm.is_finite() && reference_ohm > T::zero()) {
             return Err(ParameterError::new("reference_ohm", Problem::NotPositive));
@@ -102,8 +102,8 @@ impl<T: Scalar> Divider<T> {
         Ok(Self { reference_ohm, side, converter: Converter::new(bits, noise_codes)? })
     }
 
-    /// The resistance behind a code: `R = R_ref x/(1-x)` on the low side, `R_ref (1-x)/x` on the high side, with x the
-    /// code over full scale.
+    /// Returns the resistance of a code, Ω: `R = R_ref x/(1-x)` on the low side, `R_ref (1-x)/x` on the high side, with
+    /// x the code over full scale.
     #[must_use]
     pub fn read(&self, code: u32) -> AdcCode<T> {
         if self.converter.is_saturated(code) {
@@ -122,7 +122,7 @@ impl<T: Scalar> Divider<T> {
         })
     }
 
-    /// The code that a resistance gives, unrounded.
+    /// Returns the unrounded code of a resistance.
     #[must_use]
     pub fn code(&self, resistance_ohm: T) -> T {
         let share = resistance_ohm / (resistance_ohm + self.reference_ohm);
@@ -148,7 +148,7 @@ impl<T: Scalar> ConstantCurrent<T> {
         Ok(Self { ohm_per_code: volts_per_code / (current_a * gain), converter })
     }
 
-    /// The resistance behind a code.
+    /// Returns the resistance of a code, Ω.
     #[must_use]
     pub fn read(&self, code: u32) -> AdcCode<T> {
         if self.converter.is_saturated(code) {
@@ -160,7 +160,7 @@ impl<T: Scalar> ConstantCurrent<T> {
         })
     }
 
-    /// The code that a resistance gives, unrounded.
+    /// Returns the unrounded code of a resistance.
     #[must_use]
     pub fn code(&self, resistance_ohm: T) -> T {
         resistance_ohm / self.ohm_per_code
@@ -168,7 +168,7 @@ impl<T: Scalar> ConstantCurrent<T> {
 }
 
 impl<T: Scalar> FrontEnd<T> {
-    /// The resistance behind a code.
+    /// Returns the resistance of a code, Ω.
     #[must_use]
     pub fn read(&self, code: u32) -> AdcCode<T> {
         match self {
@@ -177,7 +177,7 @@ impl<T: Scalar> FrontEnd<T> {
         }
     }
 
-    /// The code that a resistance gives, unrounded.
+    /// Returns the unrounded code of a resistance.
     #[must_use]
     pub fn code(&self, resistance_ohm: T) -> T {
         match self {

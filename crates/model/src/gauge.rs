@@ -1,7 +1,7 @@
 use crate::Scalar;
 use crate::error::{ParameterError, Problem};
 
-/// The quasi-static curve g(ε): relative change of resistance after everything has relaxed, with g(0) = 0.
+/// The quasi-static curve g(ε): relative change of resistance once all branches have relaxed, with g(0) = 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -57,8 +57,8 @@ impl<T: Scalar> Gauge<T> {
         }
     }
 
-    /// Checks that a gauge with valid coefficients has a value everywhere from `lower` to `upper`, and that particles that
-    /// tunnel never touch.
+    /// Checks that a gauge with valid coefficients has a finite value everywhere from `lower` to `upper`, and that the
+    /// tunnelling gap stays positive.
     ///
     /// # Errors
     /// If the range is too wide for the gauge.
@@ -82,7 +82,7 @@ impl<T: Scalar> Gauge<T> {
         if ends.into_iter().all(finite) { Ok(()) } else { Err(ParameterError::new("gauge", Problem::OutOfRange)) }
     }
 
-    /// g(ε) and its slope g′(ε).
+    /// Returns g(ε) and its slope g′(ε).
     #[must_use]
     pub fn value_and_slope(&self, strain: T) -> (T, T) {
         match *self {
@@ -104,7 +104,7 @@ impl<T: Scalar> Gauge<T> {
         }
     }
 
-    /// The strains at which g′ = 0, ascending: beyond the first one strain is ambiguous.
+    /// Returns the strains at which g′ = 0, ascending; beyond the first, strain is ambiguous.
     #[must_use]
     pub fn static_borders(&self) -> [Option<T>; 2] {
         match *self {

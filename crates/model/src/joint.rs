@@ -15,7 +15,7 @@ impl<T: Scalar> Joint<T> {
     /// - `gauge_length_mm` L₀: length of the unstretched sensor, positive.
     ///
     /// # Errors
-    /// Names the parameter that no joint can have.
+    /// Names the invalid parameter.
     pub fn new(prestrain: T, moment_arm_mm: T, gauge_length_mm: T) -> Result<Self, ParameterError> {
         if !prestrain.is_finite() {
             return Err(ParameterError::new("prestrain", Problem::NotFinite));
@@ -29,13 +29,13 @@ impl<T: Scalar> Joint<T> {
         Ok(Self { prestrain, moment_arm_mm, gauge_length_mm })
     }
 
-    /// Strain at a joint angle in rad.
+    /// Returns the strain at a joint angle in rad.
     #[must_use]
     pub fn strain(&self, angle_rad: T) -> T {
         self.prestrain + self.moment_arm_mm * angle_rad / self.gauge_length_mm
     }
 
-    /// Joint angle in rad and its standard deviation, from strain and its standard deviation.
+    /// Returns the joint angle and its standard deviation, rad, from the strain and its standard deviation.
     #[must_use]
     pub fn angle_rad(&self, strain: T, strain_sd: T) -> (T, T) {
         let rad_per_strain = self.gauge_length_mm / self.moment_arm_mm;

@@ -1,7 +1,7 @@
 use crate::error::{ParameterError, Problem};
 use crate::{Gauge, Number, Phase, Scalar};
 
-/// One relaxing contribution to the resistance: `ċ = -c/τ + (k + κ ε) v`, with gains of their own for stretching and
+/// One relaxing contribution to the resistance: `ċ = -c/τ + (k + κ ε) v`, with separate gains for stretching and
 /// releasing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -19,10 +19,10 @@ pub struct Branch<T> {
     pub retract_gain_slope: T,
 }
 
-/// The strains for which a law was made.
+/// Range of strains for which a law was fitted.
 ///
-/// Outside of it the gauge curve goes on along its tangent and the gains keep their border values, because a
-/// polynomial extrapolates to nonsense and a filter must still find its way back.
+/// Outside it, the gauge curve continues along its tangent and the gains keep their values at the border: an
+/// extrapolated polynomial is meaningless, and a filter must still be able to return.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -34,7 +34,7 @@ pub struct StrainRange<T> {
 }
 
 impl<T: Number> StrainRange<T> {
-    /// `strain`, moved to the nearer end if it lies outside.
+    /// Returns `strain`, moved to the nearer end if it lies outside.
     #[must_use]
     pub fn clamp(&self, strain: T) -> T {
         strain.max(self.lower).min(self.upper)
@@ -52,7 +52,7 @@ impl<T: Number> StrainRange<T> {
         self.upper - self.lower
     }
 
-    /// Variance of a strain that may be anywhere in the range.
+    /// Variance of a strain distributed uniformly over the range.
     #[must_use]
     pub fn variance_of_anywhere(&self) -> T {
         let span = self.span();
@@ -86,7 +86,7 @@ impl<T: Scalar, const B: usize> SensorLaw<T, B> {
     /// Checks every parameter.
     ///
     /// # Errors
-    /// Names the parameter that no law can have.
+    /// Names the invalid parameter.
     pub fn validate(&self) -> Result<(), ParameterError> {
         self.gauge.validate()?;
         if !(self.extend_viscosity_s.is_finite() && self.retract_viscosity_s.is_finite()) {
@@ -111,7 +111,7 @@ impl<T: Scalar, const B: usize> SensorLaw<T, B> {
         self.gauge.validate_within(lower, upper)
     }
 
-    /// g(ε) and g′(ε), continued along the tangent outside the range.
+    /// Returns g(ε) and g′(ε), continued along the tangent outside the range.
     #[must_use]
     pub fn gauge_value_and_slope(&self, strain: T) -> (T, T) {
         let inside = self.range.clamp(strain);
@@ -142,7 +142,7 @@ impl<T: Scalar, const B: usize> SensorLaw<T, B> {
         (gain + slope * self.range.clamp(strain), slope_here)
     }
 
-    /// ρ = R/R₀ - 1 from strain, rate (1/s), relaxation states and baseline.
+    /// Returns ρ = R/R₀ - 1 from strain, rate (1/s), relaxation states and baseline.
     #[must_use]
     pub fn relative_change(&self, strain: T, rate: T, relaxation: &[T; B], baseline: T, phase: Phase) -> T {
         let (gauge, _) = self.gauge_value_and_slope(strain);
@@ -150,8 +150,8 @@ impl<T: Scalar, const B: usize> SensorLaw<T, B> {
         gauge + self.viscosity_s(phase) * rate + relaxing + baseline
     }
 
-    /// dρ/dt over v on a ramp of constant rate v: how much the reading changes per strain *along the movement*, relaxation
-    /// included: `g′(ε) + Σ (kᵢᵖ + κᵢᵖ ε) - Σ cᵢ/(τᵢ v)`. It vanishes at the ramp border ε*(v).
+    /// Returns dρ/dt over v on a ramp of constant rate v, the change of the reading per strain *along the movement*, with
+    /// relaxation: `g′(ε) + Σ (kᵢᵖ + κᵢᵖ ε) - Σ cᵢ/(τᵢ v)`. It is zero at the ramp border ε*(v).
     #[must_use]
     pub fn ramp_slope(&self, strain: T, rate: T, relaxation: &[T; B], phase: Phase) -> T {
         let (_, slope) = self.gauge_value_and_slope(strain);
@@ -161,9 +161,9 @@ impl<T: Scalar, const B: usize> SensorLaw<T, B> {
         })
     }
 
-    /// The static border, beyond which one reading belongs to two strains: the smallest strain of the range at which the
-    /// gauge curve peaks; or, where it has no peak and falls by more than it rises again, its valley. (A curve that mostly
-    /// rises may begin with a dip; what lies beyond that is not ambiguous.)
+    /// Returns the static border, beyond which one reading belongs to two strains. It is the smallest strain in range at
+    /// which the gauge curve peaks. If there is no peak and the curve ends below its start, it is the valley. (A curve
+    /// that mostly rises may begin with a dip; strains beyond that are not ambiguous.)
     #[must_use]
     pub fn static_border(&self) -> Option<T> {
         let nudge = T::of(1e-3) * self.range.span();

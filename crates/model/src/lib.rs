@@ -1,9 +1,9 @@
 //! The resistance of a soft, stretchable strain sensor as a state-space model.
 //!
 //! The default law is the *switched Kelvin-Voigt* law ([`SensorLaw`]): a quasi-static gauge curve, a dash-pot term and
-//! relaxing branches that stretching and releasing drive with different gains. [`SwitchedModel`] joins it with a
-//! prior on how the body moves ([`Motion`]) and with drift ([`ModelNoise`]), and gives the transition, process noise
-//! and measurement gradient that a Kalman-type filter needs.
+//! relaxing branches whose gains differ between stretching and releasing. [`SwitchedModel`] joins it with a prior on
+//! how the body moves ([`Motion`]) and with drift ([`ModelNoise`]), and gives the transition, process noise and
+//! measurement gradient that a Kalman-type filter needs.
 //!
 //! # Policy
 //! - `no_std`, no heap, no unsafe code, no panic: constructors validate and return [`ParameterError`]; evaluation of a
@@ -14,10 +14,10 @@
 //!
 //! # Features
 //! Both off by default, both without std.
-//! - `serde`: laws, noise, packed matrices, phases and what a converter delivered as plain data; nothing is checked that the
-//!   constructor of the model does not check anyway. [`Motion`], [`Joint`] and front ends are left out: they are
-//!   made by constructors that check, and an infinite deviation, which a motion may have, does not survive JSON. Store the
-//!   arguments of their constructors. [`ParameterError`] borrows its name from the code and cannot come back.
+//! - `serde`: laws, noise, packed matrices, phases and converter results as plain data. Deserialising checks nothing,
+//!   because the constructor of the model does. [`Motion`], [`Joint`] and front ends are left out: their constructors
+//!   validate, and the infinite deviation that a motion may have does not survive JSON. Store the arguments of their
+//!   constructors. [`ParameterError`] borrows a static name and cannot be deserialised.
 //! - `defmt`: `Format` for the same, and for errors.
 #![no_std]
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic)]

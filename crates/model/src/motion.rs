@@ -8,8 +8,8 @@ pub const MOTION_STATES: usize = 2;
 ///
 /// `v̇ = -restoring₀ (ε - rest) - restoring₁ v + white noise`.
 ///
-/// It is given by statistics that a recording shows directly: standard deviations of strain and rate, and how long a rate
-/// lasts. An infinite `strain_sd` means no pull toward a mean strain.
+/// Its parameters can be read off a recording: standard deviations of strain and rate, and the correlation time of the
+/// rate. An infinite `strain_sd` means no pull toward a mean strain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion<T> {
     restoring: [T; MOTION_STATES],
@@ -24,7 +24,8 @@ impl<T: Scalar> Motion<T> {
     ///
     /// - `rate_time_s`: correlation time T_v of the rate, s.
     /// - `rate_sd`: standard deviation σ_v of the rate, 1/s.
-    /// - `strain_mean`, `strain_sd`: distribution of strain; `strain_sd` infinite for none.
+    /// - `strain_mean`, `strain_sd`: long-run distribution of strain; an infinite `strain_sd` means no pull toward the
+    ///   mean.
     ///
     /// # Errors
     /// Names the parameter that is not positive or not finite.
@@ -47,10 +48,11 @@ impl<T: Scalar> Motion<T> {
         })
     }
 
-    /// Makes the rate revert to `+phase_rate` while stretching and `-phase_rate` while releasing, 1/s; zero for no such rate.
+    /// Makes the rate revert to `+phase_rate` while stretching and `-phase_rate` while releasing, 1/s; zero means no
+    /// preferred speed.
     ///
     /// # Errors
-    /// If it is below zero or not finite.
+    /// If `phase_rate` is negative or not finite.
     pub fn with_phase_rate(mut self, phase_rate: T) -> Result<Self, ParameterError> {
         if !phase_rate.is_finite() {
             return Err(ParameterError::new("phase_rate", Problem::NotFinite));
@@ -62,13 +64,13 @@ impl<T: Scalar> Motion<T> {
         Ok(self)
     }
 
-    /// Coefficients of the restoring term, of ε first; 1/s² and 1/s.
+    /// Coefficients of the restoring term: of ε, 1/s², and of v, 1/s.
     #[must_use]
     pub const fn restoring(&self) -> &[T; MOTION_STATES] {
         &self.restoring
     }
 
-    /// Spectral density of the driving noise.
+    /// Spectral density of the driving noise, 1/s³.
     #[must_use]
     pub fn noise_density(&self) -> T {
         self.noise_density
@@ -86,13 +88,14 @@ impl<T: Scalar> Motion<T> {
         self.phase_rate
     }
 
-    /// Variances of strain and rate in the long run: the prior before anything is known. Infinite where there is none.
+    /// Stationary variances of strain and rate, the prior before any reading; infinite where there is no stationary
+    /// distribution.
     #[must_use]
     pub const fn stationary_variance(&self) -> &[T; MOTION_STATES] {
         &self.stationary_variance
     }
 
-    /// An upper bound of the fastest rate in the motion, 1/s.
+    /// Upper bound on the fastest rate of the motion's dynamics, 1/s.
     pub(crate) fn fastest_rate(&self) -> T {
         let [to_strain, to_rate] = self.restoring;
         to_rate.abs().max(to_strain.abs().sqrt())

@@ -3,8 +3,8 @@ use crate::error::{ParameterError, Problem};
 
 /// Part of the reading that the law does not explain, in units of ρ = R/R₀ - 1.
 ///
-/// Sensor noise is a small part of it: model error, slowly varying, is ten to a hundred times larger. Putting it into
-/// `reading_sd` as white noise makes a filter overconfident; it belongs into the baseline and the branches.
+/// Sensor noise is a small part of it; model error, which varies slowly, is ten to a hundred times larger. Model error
+/// belongs in the baseline and the branches. As white noise in `reading_sd` it makes a filter overconfident.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -23,7 +23,7 @@ impl<T: Scalar> ModelNoise<T> {
     /// Checks every parameter.
     ///
     /// # Errors
-    /// Names the parameter that is negative, not finite, or a time that is not positive.
+    /// Names a deviation that is negative or not finite, or a time that is not positive.
     pub fn validate(&self) -> Result<(), ParameterError> {
         for (name, value) in
             [("reading_sd", self.reading_sd), ("branch_sd", self.branch_sd), ("baseline_sd", self.baseline_sd)]

@@ -1,6 +1,6 @@
 use crate::Scalar;
 
-/// Movement of the body: the law's gains and dash-pot depend on it.
+/// Phase of the body's movement; the law's gains and dash-pot depend on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -17,7 +17,7 @@ impl Phase {
     /// All phases, in the order in which they are reported.
     pub const ALL: [Self; 3] = [Self::Extend, Self::Hold, Self::Retract];
 
-    /// Place in [`Phase::ALL`].
+    /// Index in [`Phase::ALL`].
     #[must_use]
     pub const fn index(self) -> usize {
         match self {
@@ -31,10 +31,10 @@ impl Phase {
 /// Direction of a step: it selects one of the law's two sets of gains.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Direction<T> {
-    /// The phase is given: a hypothesis, or known from elsewhere.
+    /// The phase is given, as a hypothesis or from another source.
     Known(Phase),
-    /// The sign of the rate at the end of the step is a hypothesis, that at its start was one: on the way the rate may have
-    /// turned around, and the body has gone further than its net move.
+    /// The signs of the rate at both ends of the step are hypotheses. In between the rate may have turned around, so that
+    /// the body's path is longer than its net displacement.
     Within {
         /// A moving phase: the sign at the end.
         phase: Phase,
@@ -42,40 +42,41 @@ pub enum Direction<T> {
         turning: Turning<T>,
     },
     /// The phase is not known, only that the rate is Gaussian around its prediction. Each set of gains is driven by the
-    /// rate it is expected to see, `E[max(v, 0)]` or `E[min(v, 0)]`, and weighted in the Jacobian with the probability
-    /// of its direction: statistical linearisation of the switch, smooth where a sign would jump.
+    /// expected rate in its direction, `E[max(v, 0)]` or `E[min(v, 0)]`, and weighted in the Jacobian by the
+    /// probability of that direction. This statistical linearisation of the switch is smooth where a sign would jump.
     Uncertain {
         /// Standard deviation of the rate over the step, 1/s.
         rate_sd: T,
-        /// Factor by which the variance of the linearisation error over many steps exceeds that of errors drawn anew in each
-        /// step: the error lasts as long as the rate's error does, longer than a short step and not as long as a long one.
+        /// Factor by which the variance of the linearisation error over many steps exceeds that of errors independent from
+        /// step to step. The error lasts as long as the rate's error: longer than a short step, and shorter than a long one.
         persistence: T,
     },
 }
 
-/// The path that a body goes beyond its net move because its rate turns around within a step, over the step's length.
+/// Path beyond the body's net displacement because its rate turns around within a step, divided by the step's length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Turning<T> {
-    /// Expected, 1/s.
+    /// Mean, 1/s.
     pub excess: T,
     /// Its variance, 1/s².
     pub variance: T,
 }
 
-/// Var(max(v, 0)) of a centred v of unit variance, less what the line ½ v explains: ¼ - 1/(2π).
+/// Var(max(v, 0)) for a centred v of unit variance, minus the part explained by the line ½ v: ¼ - 1/(2π).
 pub const UNEXPLAINED: f64 = 0.090_845_056_908_105_33;
-/// Shape of the same for any mean, in powers of 4 Φ (1 - Φ).
+/// Dependence of that variance on the mean: coefficients in powers of 4 Φ (1 - Φ).
 pub const UNEXPLAINED_SHAPE: (f64, f64) = (0.77, 0.23);
 
-/// The variance of max(v, 0) that its statistical linearisation leaves, v normal with probability `extends` of a positive
-/// sign and the given variance: Var(max(v, 0)) - Φ² Var(v), by a fit that is off by at most 3 % of its maximum.
+/// Returns the variance of max(v, 0) that its statistical linearisation leaves unexplained, Var(max(v, 0)) - Φ² Var(v),
+/// for a normal v of the given variance that is positive with probability `extends`. The fit is off by at most 3 % of its
+/// maximum.
 #[inline(always)]
 pub fn unexplained<T: Scalar>(extends: T, retracts: T, variance: T) -> T {
     let both = extends * T::of(4.0) * retracts;
     variance * T::of(UNEXPLAINED) * both * (T::of(UNEXPLAINED_SHAPE.0) + both * T::of(UNEXPLAINED_SHAPE.1))
 }
 
-/// Steepness of the logistic distribution that stands for the normal one: `Φ(r) ≈ 1/(1 + exp(-1.702 r))`.
+/// Steepness of the logistic distribution that approximates the normal one: `Φ(r) ≈ 1/(1 + exp(-1.702 r))`.
 pub(crate) const STEEPNESS: f64 = 1.702;
 
 /// Split of a rate between stretching and releasing.
@@ -89,8 +90,8 @@ pub struct SplitRate<T> {
     pub extend_probability: T,
     /// Probability of releasing, the slope of `retract`.
     pub retract_probability: T,
-    /// Variance of the stretching rate around `extend` that the rate does not explain, 1/s²; as much, of opposite sign, is
-    /// the releasing rate's.
+    /// Variance of the stretching rate around `extend` that the linearisation leaves unexplained, 1/s². The releasing rate
+    /// has the same unexplained variance, with errors of opposite sign.
     pub variance: T,
 }
 
@@ -98,8 +99,8 @@ impl<T: Scalar> Direction<T> {
     /// Splits a mean rate, 1/s.
     ///
     /// The normal distribution is replaced by the logistic one, `Φ(r) ≈ 1/(1 + exp(-1.702 r))`, off by at most 0.0095
-    /// (Bowling et al., *J. Ind. Eng. Manag.* 2 (2009) 114): its integral has a closed form, and neither needs an error
-    /// function.
+    /// (Bowling et al., *J. Ind. Eng. Manag.* 2 (2009) 114): its integral has a closed form, and no error function is
+    /// needed.
     #[must_use]
     pub fn split(self, rate: T) -> SplitRate<T> {
         let (zero, one) = (T::zero(), T::one());
@@ -115,7 +116,7 @@ impl<T: Scalar> Direction<T> {
                 }
             }
             Self::Uncertain { rate_sd, .. } => {
-                // Below this share of the rate the deviation makes no difference, and 0/0 is avoided.
+                // Below this fraction of the rate, the deviation makes no difference; the bound also avoids 0/0.
                 let scale = (rate_sd.max(rate.abs() * T::of(0.01)) + T::of(1e-30)) / T::of(STEEPNESS);
                 let lean = rate / scale;
                 // ln(1 + exp(x)) = max(x, 0) + ln(1 + exp(-|x|)), which cannot overflow.
@@ -137,7 +138,7 @@ impl<T: Scalar> Direction<T> {
 }
 
 impl<T: Scalar> SplitRate<T> {
-    /// All of the rate in one direction, or in none.
+    /// Assigns the whole rate to one direction, or to none.
     fn known(phase: Phase, rate: T) -> Self {
         let (zero, one) = (T::zero(), T::one());
         let none =
@@ -149,13 +150,13 @@ impl<T: Scalar> SplitRate<T> {
         }
     }
 
-    /// Expected product of gain and rate.
+    /// Returns the expected product of gain and rate.
     #[must_use]
     pub fn drive(&self, extend_gain: T, retract_gain: T) -> T {
         extend_gain * self.extend + retract_gain * self.retract
     }
 
-    /// Its derivative with respect to the rate.
+    /// Returns the derivative of [`Self::drive`] with respect to the rate.
     #[must_use]
     pub fn slope(&self, extend_gain: T, retract_gain: T) -> T {
         extend_gain * self.extend_probability + retract_gain * self.retract_probability

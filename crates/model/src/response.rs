@@ -1,24 +1,25 @@
 use crate::motion::MOTION_STATES as M;
 use crate::{Branch, Motion, Scalar};
 
-/// Response of the motion and of branches of unit gain over one time step: everything in the transition that depends on the
-/// step's length and not on the state. Compute it once for a fixed step.
+/// Response of the motion and of branches of unit gain over one time step: the part of the transition that depends on the
+/// step's length but not on the state. Compute it once for a fixed step.
 ///
 /// With m the motion states (ε, v) and c a branch of gain 1,
 /// `m' = m + motion_change · m + input · u + n`, `c' = c + decay_change · c + drive · m + drive_input · u + w`,
-/// u a constant push on the rate, n and w Gaussian. Changes are kept instead of transitions because a
-/// transition close to the identity has lost the digits that matter, above all in `f32`.
+/// with u a constant push on the rate, and n and w Gaussian. Changes are stored instead of transitions, because a
+/// transition close to the identity has lost the significant digits, above all in `f32`.
 ///
 /// Textbook formulas for these integrals subtract nearly equal numbers when the step is short against a time
-/// constant. Here they are Taylor sums and Gauss-Legendre sums of one sign over a step so short that both are exact to
-/// rounding, doubled as often as needed: nothing cancels, for any ratio of step to time constant, in `f32` too.
+/// constant. Here they are Taylor and Gauss-Legendre sums, of terms of one sign, over a step so short that both are
+/// exact to rounding. The step is then doubled as often as needed. Nothing cancels, for any ratio of step to time
+/// constant, even in `f32`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Response<T, const B: usize> {
     /// Length of the step, s.
     pub dt_s: T,
     /// Transition of the motion, less the identity.
     pub motion_change: [[T; M]; M],
-    /// Answer of the motion to a unit push.
+    /// Response of the motion to a unit push.
     pub input: [T; M],
     /// Covariance of n.
     pub motion_noise: [[T; M]; M],
@@ -26,7 +27,7 @@ pub struct Response<T, const B: usize> {
     pub decay_change: [T; B],
     /// Contribution of each motion state at the start to each branch.
     pub drive: [[T; M]; B],
-    /// Answer of each branch to a unit push.
+    /// Response of each branch to a unit push.
     pub drive_input: [T; B],
     /// Covariance of w with n.
     pub cross_noise: [[T; M]; B],
@@ -44,8 +45,8 @@ const TERMS: usize = 14;
 /// Gauss-Legendre nodes and weights on [0, 1] (Abramowitz & Stegun, table 25.4). Seven points leave an error below
 /// 1e-17 of the integral of `s⁴ exp(2 λ s)`, the worst integrand here, at `|λ h| ≤ 1/4`.
 ///
-/// Literals one by one, which become `T` while compiling: a table of `f64` would be converted at run time, in software on
-/// a microcontroller.
+/// Each literal becomes `T` at compile time. A table of `f64` would be converted at run time, in software on a
+/// microcontroller.
 fn nodes<T: Scalar>() -> [(T, T); 7] {
     [
         (T::of(0.0254460438286207), T::of(0.06474248308443487)),
@@ -62,7 +63,7 @@ fn nodes<T: Scalar>() -> [(T, T); 7] {
 const MOST_DOUBLINGS: u32 = 52;
 
 impl<T: Scalar, const B: usize> Response<T, B> {
-    /// The answer over `dt_s ≥ 0` seconds.
+    /// Computes the response over `dt_s ≥ 0` seconds.
     #[must_use]
     pub fn new(motion: &Motion<T>, branches: &[Branch<T>; B], dt_s: T) -> Self {
         let mut fastest = motion.fastest_rate();
@@ -82,7 +83,7 @@ impl<T: Scalar, const B: usize> Response<T, B> {
         response
     }
 
-    /// The answer over a step `h` that is short against every time constant.
+    /// Computes the response over a step `h` that is short compared with every time constant.
     fn short(motion: &Motion<T>, branches: &[Branch<T>; B], h: T) -> Self {
         let mut out = Self {
             dt_s: h,
@@ -132,7 +133,7 @@ impl<T: Scalar, const B: usize> Response<T, B> {
         }
     }
 
-    /// The answer over twice the step: this one after itself.
+    /// Returns the response over twice the step: this one applied twice.
     fn doubled(&self) -> Self {
         let change = &self.motion_change;
         let forward = |x: &[T; M]| add(mul_vec(change, x), x);
@@ -185,7 +186,7 @@ impl<T: Scalar, const B: usize> Response<T, B> {
     }
 }
 
-/// Taylor coefficients in time of how motion and branches of unit gain go on from a unit start.
+/// Taylor coefficients, in time, of motion and branches of unit gain from a unit initial state.
 struct Series<T, const B: usize> {
     motion: [[T; M]; TERMS],
     branches: [[T; B]; TERMS],
@@ -211,13 +212,13 @@ impl<T: Scalar, const B: usize> Series<T, B> {
         series
     }
 
-    /// Motion and branches at time `s`.
+    /// Returns motion and branches at time `s`.
     fn at(&self, s: T) -> ([T; M], [T; B]) {
         let (on_motion, on_branches) = self.change_at(s);
         (add(on_motion, &self.motion[0]), on_branches)
     }
 
-    /// Their change from time 0 to `s` (Horner).
+    /// Returns their change from time 0 to `s` (Horner).
     fn change_at(&self, s: T) -> ([T; M], [T; B]) {
         let mut out = ([T::zero(); M], [T::zero(); B]);
         for n in (1..TERMS).rev() {
@@ -231,7 +232,7 @@ impl<T: Scalar, const B: usize> Series<T, B> {
         out
     }
 
-    /// Their integrals from 0 to `h`.
+    /// Returns their integrals from 0 to `h`.
     fn integral(&self, h: T) -> ([T; M], [T; B]) {
         let mut out = ([T::zero(); M], [T::zero(); B]);
         let mut order = T::of(TERMS as f64);

@@ -1,7 +1,7 @@
-//! Path that the direction of motion leaves open over a step: of a rate whose sign is not known, or that turns around on the way.
+//! Uncertain path over a step of a rate whose sign is unknown, or that turns around within the step.
 //!
-//! Branches are driven by the path of the body, each way with a gain of its own. A Gaussian knows the net move and
-//! the probability of its direction; this module adds the rest of the path, as a mean and a variance.
+//! Branches are driven by the path of the body, with a separate gain for each direction. A Gaussian gives the net
+//! displacement and the probability of its direction; this module adds the mean and variance of the remaining path.
 
 use nalgebra::SVector;
 
@@ -9,48 +9,49 @@ use crate::motion::MOTION_STATES as M;
 use crate::phase::{Direction, Turning};
 use crate::{Branch, Motion, Phase, Scalar, SwitchedModel, SwitchedStep, Symmetric};
 
-/// `1 - r²` of neighbouring steps from which on it counts as no less: a persistence of 10⁴ steps.
+/// Smallest value used for `1 - r²` of neighbouring steps: a persistence of 10⁴ steps.
 pub const LEAST_LEFT: f64 = 2e-4;
 
-/// Mean path beyond the net move with the sign at the end, ¼, for a Brownian rate that passes zero with unit density and
-/// changes by one standard deviation over a step of unit length. Below, the variance of that path given the rates
-/// at both ends, by simulation.
+/// Mean path beyond the net displacement, in the direction of the final sign, ¼, for a Brownian rate that passes zero
+/// with unit density and changes by one standard deviation over a step of unit length. The constant below is the
+/// variance of that path given the rates at both ends, from simulation.
 const BROWNIAN_EXCESS: f64 = 0.25;
 const BROWNIAN_VARIANCE: f64 = 0.0537;
-/// Distance from zero, in standard deviations of its change over the step, at which a rate starts that turns around: if its density
-/// falls off within that distance, fewer rates turn around. 1.27 from an exponential density, 0 from a flat one.
+/// Distance from zero at which a rate that turns around starts, in standard deviations of its change over the step. If the density
+/// falls off within that distance, fewer rates turn around. 1.27 for an exponential density, 0 for a flat one.
 const REACH: f64 = 0.6;
-/// A rate that changes evenly by w and passes zero: the path beyond the net move's is `a²/w` if `a` of w lie beyond zero, in
-/// the mean `w/3`; times the probability w that it passes.
+/// Mean excess path, as a fraction of w², of a rate that changes evenly by w and crosses zero. The path beyond the net
+/// displacement is `a²/w` if `a` of w lies beyond zero, on average `w/3`; the probability of crossing is w.
 const EVEN_EXCESS: f64 = 1.0 / 3.0;
 /// Deviations from zero at which no rate turns around.
 const CLEAR: f64 = 4.5;
-/// Longest step over the time in which the rate changes.
+/// Longest step, as a fraction of the correlation time of the rate.
 const LONGEST: f64 = 1.0 / 3.0;
 /// 1/√(2π).
 const NORMAL_DENSITY: f64 = 0.398_942_280_401_432_7;
 
-/// Factor on the steps' persistence for a step that is no longer short against the motion's memory. With it the variance
-/// that the direction leaves open grows at one rate without readings, whatever the step. A rate with white acceleration
-/// correlates as exp(-t/T_v) and its direction as the square of that, whose steps sum up to coth(h/T_v).
+/// Returns the factor on the persistence for a step that is not short compared with the correlation time of the rate.
+/// With it, the variance due to the uncertain direction grows at the same rate without readings, whatever the step
+/// length. A rate with white acceleration correlates as exp(-t/T_v), its direction as the square of that; the sum over
+/// steps is coth(h/T_v).
 pub(crate) fn averaging<T: Scalar>(motion: &Motion<T>, dt_s: T) -> T {
     let x = dt_s * motion.restoring()[1];
     if x < T::of(1e-3) { T::one() } else { x.tanh() / x }
 }
 
 impl<T: Scalar> Direction<T> {
-    /// Returns the factor by which variance over steps exceeds that of errors drawn anew in each.
+    /// Returns the factor by which the variance over steps exceeds that of errors independent from step to step.
     pub(crate) fn persistence(self) -> T {
         if let Self::Uncertain { persistence, .. } = self { persistence } else { T::one() }
     }
 }
 
 impl<T: Scalar, const B: usize, const N: usize> SwitchedModel<T, B, N> {
-    /// Returns the direction over a step as one Gaussian knows it, from the covariance at the step's start.
+    /// Returns the direction over a step given one Gaussian, from the covariance at the step's start.
     ///
     /// The rate's variance is that in the middle of the step. The error of the linearised switch follows the error of the
-    /// rate, and lasts as long: the squares of that error's correlations from step to step are summed up, a
-    /// geometric series.
+    /// rate, and lasts as long: the squared correlations of that error from step to step are summed as a geometric
+    /// series.
     #[must_use]
     pub fn uncertain_direction<const L: usize>(
         &self,
@@ -70,8 +71,8 @@ impl<T: Scalar, const B: usize, const N: usize> SwitchedModel<T, B, N> {
         Direction::Uncertain { rate_sd, persistence: step.averaging * steps }
     }
 
-    /// The longest step, s, for which what the direction leaves open is worked out well: a third of the time in which the rate
-    /// changes. Infinite where stretching and releasing do the same.
+    /// Longest step, s, for which the uncertainty due to direction is computed accurately: a third of the correlation time of
+    /// the rate. Infinite if the gains of stretching and releasing are equal.
     #[must_use]
     pub fn longest_step_s(&self) -> T {
         let same = |branch: &Branch<T>| {
@@ -81,11 +82,11 @@ impl<T: Scalar, const B: usize, const N: usize> SwitchedModel<T, B, N> {
         if self.law().branches.iter().all(same) { T::one() / T::zero() } else { T::of(LONGEST) / per_time }
     }
 
-    /// Returns the open path of a rate whose sign is known at the start of a step, and again at its end.
+    /// Returns the excess path of a rate whose sign is known at the start and at the end of a step.
     ///
-    /// The density of the rate at zero determines how often it turns around. The density of a belief that was cut there is not the
-    /// Gaussian's, but between an exponential's and the Gaussian's: `exp(1 - u²)/σ` at u deviations has both ends, and is 2 % off for
-    /// one half of a Gaussian.
+    /// The density of the rate at zero determines how often it turns around. The density of a belief truncated there lies between
+    /// an exponential and the Gaussian: `exp(1 - u²)/σ` at u deviations has both as limits, and is 2 % off for one half of a
+    /// Gaussian.
     #[must_use]
     pub fn turning<const L: usize>(
         &self,
@@ -110,9 +111,9 @@ impl<T: Scalar, const B: usize, const N: usize> SwitchedModel<T, B, N> {
     }
 }
 
-/// `(1 + r²)/(1 - r²)` of a rate whose errors at both ends of a step correlate with r: squared correlations summed over all
-/// steps. `ahead` is the variance at the end, `together` the covariance of both ends, `fresh` their difference, which the
-/// caller has without subtracting them.
+/// Returns `(1 + r²)/(1 - r²)`, the sum of squared correlations over all steps, for a rate whose errors at both ends of a
+/// step have correlation r. `ahead` is the variance at the end, `together` the covariance of both ends, and `fresh` their
+/// difference, which the caller computes without subtraction.
 #[inline(always)]
 pub fn correlated_steps<T: Scalar>(ahead: T, together: T, fresh: T) -> T {
     let (square, both) = (ahead * ahead, together * together);
@@ -124,22 +125,22 @@ pub fn correlated_steps<T: Scalar>(ahead: T, together: T, fresh: T) -> T {
 /// Change of a rate over a step, positive away from zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RateChange<T> {
-    /// Expected, 1/s.
+    /// Mean, 1/s.
     pub expected: T,
-    /// Variance from what is not known at the start of the step, and from chance on the way; 1/s².
+    /// Variance due to the uncertainty at the start of the step, 1/s².
     pub spread: T,
-    /// Variance from chance on the way, as of a Brownian rate.
+    /// Variance due to process noise over the step, as of a Brownian rate, 1/s².
     pub noise: T,
 }
 
-/// The numbers in [`Turning::new`], for programs that write it in another language.
+/// Constants of [`Turning::new`], for programs that generate it in another language.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TurningNumbers {
     /// Deviations from zero at which no rate turns around.
     pub clear: f64,
-    /// Distance from zero at which a rate starts that turns around, in deviations of its change.
+    /// Distance from zero at which a rate that turns around starts, in standard deviations of its change.
     pub reach: f64,
-    /// Path beyond the net move's of an even change, over the product of the change and its probability.
+    /// Excess path of an even change, divided by the product of the change and its probability.
     pub even_excess: f64,
     /// Excess of a Brownian rate, and its variance.
     pub brownian: (f64, f64),
@@ -147,7 +148,7 @@ pub struct TurningNumbers {
     pub normal_density: f64,
 }
 
-/// The numbers in [`Turning::new`].
+/// Constants of [`Turning::new`].
 pub const TURNING: TurningNumbers = TurningNumbers {
     clear: CLEAR,
     reach: REACH,
@@ -157,7 +158,8 @@ pub const TURNING: TurningNumbers = TurningNumbers {
 };
 
 impl<T: Scalar> Turning<T> {
-    /// Computes the open path of a rate, positive away from zero, with its variance. A microcontroller passes its own square root as `root`.
+    /// Computes the excess path of a rate, positive away from zero, with its variance. A microcontroller passes its own square root
+    /// as `root`.
     #[inline(always)]
     pub fn new(rate: T, rate_variance: T, change: &RateChange<T>, root: impl Fn(T) -> T) -> Self {
         let zero = T::zero();
@@ -176,7 +178,7 @@ impl<T: Scalar> Turning<T> {
         let total = noise + even + spread;
         let change_sd = root(total);
         let thinner = T::one() + T::of(REACH) * change_sd * per_sd;
-        // Half of an even change of unknown sign leads toward zero.
+        // Half of an even change of unknown sign is toward zero.
         let evenly = T::of(EVEN_EXCESS) * (even + T::of(0.5) * spread);
         let by_chance = T::of(BROWNIAN_EXCESS) * noise;
         Self {

@@ -2,11 +2,11 @@ use core::ops::{Add, AddAssign, Div, Mul, MulAssign, Neg, Sub};
 
 use nalgebra::{ComplexField, RealField};
 
-/// The numbers everything here computes with: `f32`, `f64`, or a dual number that carries exact derivatives.
+/// Number type of all computations: `f32`, `f64`, or a dual number that carries exact derivatives.
 pub trait Scalar: RealField + Copy {
-    /// The nearest value to a literal of the source text.
-    // Inlined at any optimisation, so that a constant is converted while compiling: at run time it would call software on a
-    // microcontroller without double precision.
+    /// Returns the value nearest to a literal of the source text.
+    // Inlined at any optimisation level, so that a constant is converted at compile time. At run time, a microcontroller
+    // without double precision would do it in software.
     #[inline(always)]
     fn of(value: f64) -> Self {
         nalgebra::convert(value)
@@ -15,8 +15,8 @@ pub trait Scalar: RealField + Copy {
 
 impl<T: RealField + Copy> Scalar for T {}
 
-/// Operations of a computation number by number, and no more: any [`Scalar`], or an expression that stands for a number and
-/// records the operations on it. A comparison chooses a way.
+/// Scalar operations only, for any [`Scalar`] or for an expression that stands for a number and records the operations on
+/// it. A comparison selects a branch of the computation.
 pub trait Number:
     Copy
     + PartialOrd
@@ -28,13 +28,13 @@ pub trait Number:
     + Div<Output = Self>
     + Neg<Output = Self>
 {
-    /// The nearest value to a literal of the source text.
+    /// Returns the value nearest to a literal of the source text.
     #[must_use]
     fn of(value: f64) -> Self;
-    /// The larger one.
+    /// Returns the larger number.
     #[must_use]
     fn max(self, other: Self) -> Self;
-    /// The smaller one.
+    /// Returns the smaller number.
     #[must_use]
     fn min(self, other: Self) -> Self;
     /// Absolute value.
@@ -46,14 +46,14 @@ pub trait Number:
     /// Exponential.
     #[must_use]
     fn exp(self) -> Self;
-    /// Exponential, less one.
+    /// Exponential minus one.
     #[must_use]
     fn exp_m1(self) -> Self;
     /// Hyperbolic tangent.
     #[must_use]
     fn tanh(self) -> Self;
 
-    /// True if it is neither infinite nor NaN.
+    /// True if the number is neither infinite nor NaN.
     fn is_finite(self) -> bool;
 
     /// Zero.

@@ -1,10 +1,10 @@
 use crate::{Scalar, SwitchedModel};
 
-/// The number of branches, which all sizes follow from.
+/// Number of branches, which determines all sizes.
 #[derive(Clone, Copy, Debug)]
 pub struct Branches<const B: usize>;
 
-/// Models with a number of branches: strain, rate, the branches and perhaps a baseline.
+/// Models with a given number of branches: strain, rate, the branches and optionally a baseline.
 pub trait Models {
     /// Model with a baseline: `N = B + 3`.
     type WithBaseline<T: Scalar>;
@@ -12,7 +12,7 @@ pub trait Models {
     type WithoutBaseline<T: Scalar>;
 }
 
-/// A sensor with `B` branches, four at most, and a baseline that drifts.
+/// Model with `B` branches, at most four, and a drifting baseline.
 ///
 /// ```
 /// use ohmstrain_model::{SwitchedModel, WithBaseline};
@@ -23,7 +23,7 @@ pub trait Models {
 /// ```
 pub type WithBaseline<T, const B: usize> = <Branches<B> as Models>::WithBaseline<T>;
 
-/// The same without a baseline.
+/// Model with `B` branches, at most four, without a baseline.
 pub type WithoutBaseline<T, const B: usize> = <Branches<B> as Models>::WithoutBaseline<T>;
 
 macro_rules! models {

@@ -20,7 +20,7 @@ pub struct Transition<T, const N: usize, const L: usize> {
 /// A scalar reading as a function of the state, at one state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observation<T, const N: usize> {
-    /// The reading expected.
+    /// Expected reading.
     pub value: T,
     /// ∂(reading)/∂x.
     pub gradient: SVector<T, N>,
@@ -30,8 +30,8 @@ pub struct Observation<T, const N: usize> {
 
 /// The switched Kelvin-Voigt law as a state-space model with state `x = [ε, v, c₁ … c_B, (b)]`.
 ///
-/// `B` branches, and a baseline if `N = B + 3`; with `N = B + 2` there is none. Anything else does not compile. `L` in the
-/// methods is `N (N + 1) / 2`.
+/// There are `B` branches, and a baseline if `N = B + 3` but not if `N = B + 2`. Any other `N` does not compile. `L` in
+/// the methods is `N (N + 1) / 2`.
 ///
 /// ```
 /// use ohmstrain_model::*;
@@ -60,14 +60,15 @@ pub struct SwitchedModel<T, const B: usize, const N: usize> {
     noise: ModelNoise<T>,
 }
 
-/// Values that [`SwitchedModel::transition`] needs for a step's length: computed once if the step is fixed.
+/// Constants of [`SwitchedModel::transition`] for one step length, computed once if the step is fixed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SwitchedStep<T, const B: usize> {
     pub(crate) response: Response<T, B>,
     branch_variance: [T; B],
     pub(crate) baseline_change: T,
     baseline_variance: T,
-    /// Share of an instant's variance that the mean over the step has, of what follows the rate's sign.
+    /// Variance of the mean over the step of a term that follows the rate's sign, as a fraction of its variance at an
+    /// instant.
     pub(crate) averaging: T,
 }
 
@@ -84,7 +85,7 @@ impl<T: Scalar, const B: usize> SwitchedStep<T, B> {
         &self.response
     }
 
-    /// Variance that each branch gathers around its law, relative to R₀, squared.
+    /// Variance that each branch gains around its law over the step, (R/R₀)².
     #[must_use]
     pub const fn branch_variance(&self) -> &[T; B] {
         &self.branch_variance
@@ -96,13 +97,14 @@ impl<T: Scalar, const B: usize> SwitchedStep<T, B> {
         self.baseline_change
     }
 
-    /// Share of an instant's variance that the mean over the step has, of what follows the rate's sign.
+    /// Variance of the mean over the step of a term that follows the rate's sign, as a fraction of its variance at an
+    /// instant.
     #[must_use]
     pub fn averaging(&self) -> T {
         self.averaging
     }
 
-    /// Variance that the baseline gathers, relative to R₀, squared.
+    /// Variance that the baseline gains over the step, (R/R₀)².
     #[must_use]
     pub fn baseline_variance(&self) -> T {
         self.baseline_variance
@@ -114,10 +116,10 @@ impl<T: Scalar, const B: usize, const N: usize> SwitchedModel<T, B, N> {
 
     pub(crate) const HAS_BASELINE: bool = N == M + B + 1;
 
-    /// Joins law, motion and noise.
+    /// Combines law, motion and noise.
     ///
     /// # Errors
-    /// Names the parameter that no model can have.
+    /// Names the invalid parameter.
     pub fn new(law: SensorLaw<T, B>, motion: Motion<T>, noise: ModelNoise<T>) -> Result<Self, ParameterError> {
         let () = Self::SIZES_FIT;
         law.validate()?;
@@ -146,8 +148,8 @@ impl<T: Scalar, const B: usize, const N: usize> SwitchedModel<T, B, N> {
         &self.noise
     }
 
-    /// Mean and variances before any reading: motion in its long-run distribution (an infinite variance of strain is
-    /// replaced by the law's range), branches relaxed, baseline in its long-run distribution.
+    /// Returns mean and variances before any reading: motion and baseline in their stationary distributions, branches
+    /// relaxed on average. An infinite variance of strain is replaced by the squared span of the law's range.
     #[must_use]
     pub fn initial_distribution(&self) -> (SVector<T, N>, [T; N]) {
         let (mut mean, mut variance) = (SVector::zeros(), [T::zero(); N]);
@@ -165,7 +167,7 @@ impl<T: Scalar, const B: usize, const N: usize> SwitchedModel<T, B, N> {
         (mean, variance)
     }
 
-    /// Prepares a step of `dt_s ≥ 0` seconds: all that does not depend on the state.
+    /// Prepares a step of `dt_s ≥ 0` seconds: the constants that do not depend on the state.
     #[must_use]
     pub fn prepare(&self, dt_s: T) -> SwitchedStep<T, B> {
         let growth = |sd: T, time_s: T| -(T::of(-2.0) * dt_s / time_s).exp_m1() * sd * sd;
@@ -178,10 +180,10 @@ impl<T: Scalar, const B: usize, const N: usize> SwitchedModel<T, B, N> {
         }
     }
 
-    /// The transition over a prepared step from `state`, linearised there.
+    /// Returns the transition over a prepared step from `state`, linearised there.
     ///
-    /// Given the phase and constant gains it is exact. Gains affine in strain are taken at mid-strain, and the
-    /// uncertainty of that strain goes into `jacobian` and `noise`.
+    /// It is exact if the phase is given and the gains are constant. Gains affine in strain are taken at mid-strain,
+    /// and the uncertainty of that strain goes into `jacobian` and `noise`.
     #[must_use]
     pub fn transition<const L: usize>(
         &self,
@@ -202,8 +204,8 @@ impl<T: Scalar, const B: usize, const N: usize> SwitchedModel<T, B, N> {
         out
     }
 
-    /// `F P Fᵀ + Q` of a transition of this model, without touching its zeros: motion moves by itself, a branch by the
-    /// motion and itself, the baseline by itself.
+    /// Returns `F P Fᵀ + Q` of a transition of this model, skipping the zeros of F: motion depends on itself, a branch
+    /// on the motion and itself, the baseline on itself.
     #[inline]
     #[must_use]
     pub fn propagate<const L: usize>(
@@ -212,7 +214,7 @@ impl<T: Scalar, const B: usize, const N: usize> SwitchedModel<T, B, N> {
         transition: &Transition<T, N, L>,
     ) -> Symmetric<T, N, L> {
         let jacobian = &transition.jacobian;
-        // The whole of P: a row is then read without asking which triangle its entries lie in.
+        // The full P: reading a row then needs no test for the triangle of an entry.
         let mut whole = [[T::zero(); N]; N];
         let mut entries = covariance.packed().iter();
         for i in 0..N {
@@ -241,7 +243,7 @@ impl<T: Scalar, const B: usize, const N: usize> SwitchedModel<T, B, N> {
         out
     }
 
-    /// Row `i` of the Jacobian, of which only these entries can differ from zero, times a column.
+    /// Returns row `i` of the Jacobian times a column, using only the entries that can differ from zero.
     #[inline]
     fn sparse_dot(i: usize, row: impl Fn(usize) -> T, column: impl Fn(usize) -> T) -> T {
         let mut sum = if i < M { T::zero() } else { row(i) * column(i) };
@@ -253,7 +255,7 @@ impl<T: Scalar, const B: usize, const N: usize> SwitchedModel<T, B, N> {
         sum
     }
 
-    /// The reading ρ = R/R₀ - 1 expected at `state`.
+    /// Returns the reading ρ = R/R₀ - 1 expected at `state`.
     #[must_use]
     pub fn observe(&self, state: &SVector<T, N>, direction: Direction<T>) -> Observation<T, N> {
         let (gauge, slope) = self.law.gauge_value_and_slope(state[0]);
@@ -272,7 +274,7 @@ impl<T: Scalar, const B: usize, const N: usize> SwitchedModel<T, B, N> {
         Observation { value, gradient, variance }
     }
 
-    /// Strain and rate: linear, whatever the gains.
+    /// Propagates strain and rate, which are linear whatever the gains.
     fn move_body<const L: usize>(
         &self,
         step: &SwitchedStep<T, B>,
@@ -295,7 +297,7 @@ impl<T: Scalar, const B: usize, const N: usize> SwitchedModel<T, B, N> {
         }
     }
 
-    /// The constant push on the rate: toward the mean strain and the phase's mean rate.
+    /// Returns the constant push on the rate, toward the mean strain and the phase's mean rate.
     pub(crate) fn push(&self, direction: Direction<T>) -> T {
         let toward_strain = self.motion.restoring()[0] * self.motion.rest_strain();
         let toward_rate = match direction {
@@ -310,7 +312,7 @@ impl<T: Scalar, const B: usize, const N: usize> SwitchedModel<T, B, N> {
         toward_strain + self.motion.restoring()[1] * toward_rate
     }
 
-    /// Branches and baseline decay, and wander around their law.
+    /// Adds the decay of branches and baseline, and their random wander.
     fn relax<const L: usize>(&self, step: &SwitchedStep<T, B>, state: &SVector<T, N>, out: &mut Transition<T, N, L>) {
         for i in 0..B {
             let (c, change) = (M + i, step.response.decay_change[i]);
@@ -326,7 +328,7 @@ impl<T: Scalar, const B: usize, const N: usize> SwitchedModel<T, B, N> {
         }
     }
 
-    /// Variance of the rate at the end of a step, from the covariance at its start.
+    /// Returns the variance of the rate at the end of a step, from the covariance at its start.
     #[must_use]
     pub fn rate_variance<const L: usize>(&self, step: &SwitchedStep<T, B>, covariance: &Symmetric<T, N, L>) -> T {
         let mut row = step.response.motion_change[1];

@@ -24,7 +24,7 @@ impl<T: Scalar, const N: usize, const L: usize> Symmetric<T, N, L> {
         Self([T::zero(); L])
     }
 
-    /// A diagonal matrix.
+    /// Builds a diagonal matrix.
     #[must_use]
     pub fn from_diagonal(diagonal: &[T; N]) -> Self {
         let mut out = Self::zeros();
@@ -34,7 +34,7 @@ impl<T: Scalar, const N: usize, const L: usize> Symmetric<T, N, L> {
         out
     }
 
-    /// The lower triangle of `matrix`; what stands above the diagonal is not read.
+    /// Takes the lower triangle of `matrix`; entries above the diagonal are not read.
     #[must_use]
     pub fn from_lower(matrix: &SMatrix<T, N, N>) -> Self {
         let mut out = Self::zeros();
@@ -46,7 +46,7 @@ impl<T: Scalar, const N: usize, const L: usize> Symmetric<T, N, L> {
         out
     }
 
-    /// The full matrix.
+    /// Returns the full matrix.
     #[must_use]
     pub fn to_matrix(&self) -> SMatrix<T, N, N> {
         SMatrix::from_fn(|i, j| self[(i, j)])
@@ -58,13 +58,13 @@ impl<T: Scalar, const N: usize, const L: usize> Symmetric<T, N, L> {
         &self.0
     }
 
-    /// The lower triangle, row by row, to be changed.
+    /// The lower triangle, row by row, mutable.
     #[must_use]
     pub const fn packed_mut(&mut self) -> &mut [T; L] {
         &mut self.0
     }
 
-    /// The matrix from its lower triangle, row by row.
+    /// Builds the matrix from its lower triangle, row by row.
     #[must_use]
     pub fn from_packed(packed: [T; L]) -> Self {
         let () = Self::LENGTH_FITS;
@@ -94,7 +94,7 @@ impl<T: Scalar, const N: usize, const L: usize> Symmetric<T, N, L> {
         }
     }
 
-    /// `A · self · Aᵀ`, symmetric by construction.
+    /// Returns `A · self · Aᵀ`, symmetric by construction.
     #[must_use]
     pub fn congruence(&self, a: &SMatrix<T, N, N>) -> Self {
         let ap = a * self.to_matrix();

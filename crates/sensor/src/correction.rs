@@ -1,4 +1,5 @@
-//! The learned correction as it runs: what the core borrows, owned; and how it is made of a sensor's parameters.
+//! The learned correction in running form: owned versions of the types that borrow in the core, and their construction
+//! from a sensor's parameters.
 
 use std::ops::Deref;
 
@@ -20,21 +21,22 @@ pub enum ProcessKind {
     Direct,
     /// Features of the past.
     Past,
-    /// Features of the future: distances of the reading from its low-passes, and rates, but not the reading itself. An error of R₀ moves
-    /// the reading, and changes these in proportion only.
+    /// Features of the future: differences of the reading from its low-passes, and rates, but not the reading itself. An error of
+    /// R₀ shifts the reading, but only scales these features.
     Future,
     /// Outputs of the filter, and features.
     Residual,
 }
 
-/// Direct processes that see one side of time, in the order of parameters.
+/// Direct processes of one side of time, in the order of the parameters.
 pub const ONE_SIDED: [ProcessKind; SIDES] = [ProcessKind::Past, ProcessKind::Future];
 
-/// The distance of a reading from the slowest low-pass of the future.
+/// Index of the reading's difference from the slowest low-pass of the future.
 const SLOWEST_OF_FUTURE: usize = OUTPUTS + FEATURES + 3;
 
 impl ProcessKind {
-    /// Places, among so many inputs of a correction, of those that it sees; the linear part of its kernel takes the first.
+    /// Returns the indices, among the `inputs` of a correction, of those that the process uses. The linear part of its
+    /// kernel takes the first.
     #[must_use]
     pub fn places(self, inputs: usize) -> Vec<usize> {
         match self {
@@ -55,7 +57,7 @@ pub fn relevance(length: f64) -> f64 {
     0.5 / (length * length)
 }
 
-/// Rows one after another, and the same side by side, as a [`Correction`] wants them.
+/// Rows one after another, and the same rows in blocks, as a [`Correction`] needs them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OwnedRows<T, const D: usize> {
     rows: Vec<[T; D]>,
@@ -63,7 +65,7 @@ pub struct OwnedRows<T, const D: usize> {
 }
 
 impl<T: Copy, const D: usize> OwnedRows<T, D> {
-    /// The same in blocks.
+    /// Returns the rows in blocks.
     pub fn blocks(&self) -> &[RowBlock<T, D>] {
         &self.blocks
     }
@@ -84,7 +86,7 @@ impl<T: Copy, const D: usize> FromIterator<[T; D]> for OwnedRows<T, D> {
     }
 }
 
-/// One after another.
+/// Derefs to the rows one after another.
 impl<T, const D: usize> Deref for OwnedRows<T, D> {
     type Target = [[T; D]];
 
@@ -93,7 +95,7 @@ impl<T, const D: usize> Deref for OwnedRows<T, D> {
     }
 }
 
-/// A [`Correction`] with everything that it borrows.
+/// A [`Correction`] that owns its data.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OwnedCorrection<T: 'static, const D: usize, const S: usize = 0> {
     /// Standardised inputs of the training rows; the first of them are the inducing rows.
@@ -106,7 +108,7 @@ pub struct OwnedCorrection<T: 'static, const D: usize, const S: usize = 0> {
     pub one_sided: [OwnedOneSided<T, D>; S],
     /// Residual process: the error of the filter's strain, from all inputs.
     pub residual: OwnedProcess<T, D>,
-    /// Strain from the features, by rows of simulated motions.
+    /// Strain from the features, trained on rows of simulated motions.
     pub simulated: Option<OwnedSimulated<T, D>>,
     /// Limits of the output.
     pub limits: StrainRange<T>,
@@ -116,7 +118,7 @@ pub struct OwnedCorrection<T: 'static, const D: usize, const S: usize = 0> {
     pub variance_factor: T,
 }
 
-/// A [`Simulated`] with everything that it borrows.
+/// A [`Simulated`] that owns its data.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OwnedSimulated<T: 'static, const D: usize> {
     /// Standardised inputs.
@@ -143,11 +145,11 @@ impl<T: Real> OwnedTriangle<T> {
     /// Builds it from the rows of an upper triangle, one after the other.
     pub fn of_rows(entries: &[T]) -> Self {
         let side = side_of(entries.len());
-        // Before row i stand i rows of side, side - 1, … entries.
+        // Row i is preceded by i rows of side, side - 1, … entries.
         Self::new(side, |i, j| entries.get(i * side - i * (i + 1) / 2 + j).copied().unwrap_or(T::zero()))
     }
 
-    /// Stripe by stripe.
+    /// Returns the columns, stripe by stripe.
     pub fn columns(&self) -> &[[T; BLOCK]] {
         &self.columns
     }
@@ -157,7 +159,7 @@ impl<T: Real> OwnedTriangle<T> {
         self.side
     }
 
-    /// The whole matrix, row by row.
+    /// Returns the full matrix, row by row.
     pub fn rows(&self) -> Vec<Vec<T>> {
         let mut rows = vec![vec![T::zero(); self.side]; self.side];
         for ((first, j), column) in stripe_places(self.side).zip(&self.columns) {
@@ -175,7 +177,7 @@ impl<T: Real> OwnedTriangle<T> {
     }
 }
 
-/// A [`OneSided`] with everything that it borrows.
+/// A [`OneSided`] that owns its data.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OwnedOneSided<T: 'static, const D: usize> {
     /// The process.
@@ -196,12 +198,12 @@ impl<T: Real + 'static, const D: usize> OwnedOneSided<T, D> {
     }
 }
 
-/// Rows of a triangle with so many entries, n (n + 1)/2.
+/// Returns the number n of rows of a triangle with `entries` = n (n + 1)/2.
 pub(crate) fn side_of(entries: usize) -> usize {
     (0..).take_while(|side| side * (side + 1) / 2 <= entries).last().unwrap_or(0)
 }
 
-/// A [`Process`] with everything that it borrows.
+/// A [`Process`] that owns its data.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OwnedProcess<T: 'static, const D: usize> {
     /// Weight of each training row.
@@ -213,7 +215,7 @@ pub struct OwnedProcess<T: 'static, const D: usize> {
 }
 
 impl<T: Real + 'static, const D: usize, const S: usize> OwnedCorrection<T, D, S> {
-    /// Borrows the correction in the form that runs.
+    /// Borrows the correction in running form.
     pub fn correction(&self) -> Correction<'_, T, D, S> {
         Correction {
             rows: self.rows.as_rows(),
@@ -260,7 +262,7 @@ impl InputScales {
     }
 }
 
-/// Inputs in standard deviations from their means.
+/// Returns the inputs as deviations from their means, in standard deviations.
 #[must_use]
 pub fn standardised<const D: usize>(scales: &[InputScale<f64>; D], row: &[f64; D]) -> [f64; D] {
     std::array::from_fn(|i| (row[i] - scales[i].mean) / scales[i].sd)
@@ -313,7 +315,8 @@ impl<const D: usize> OwnedProcess<f64, D> {
 }
 
 impl OwnedSimulated<f64, FILTER_INPUTS> {
-    /// Builds it from checked parameters; `scales` are those of the correction, whose range simulated rows extend.
+    /// Builds it from checked parameters; `scales` are those of the correction, whose ranges are extended to the
+    /// simulated rows.
     pub(crate) fn new(params: &SimulatedParams, scales: &[InputScale<f64>; FILTER_INPUTS]) -> Self {
         let inputs: Vec<_> = params.rows.iter().map(|past| filter_inputs(&[0.0; OUTPUTS], past)).collect();
         let mut wider = *scales;

@@ -1,13 +1,13 @@
 //! A calibrated soft strain sensor: its parameters, and the filters and smoothers that run from them.
 //!
 //! [`SensorParams`] is the content of `sensor.toml`; [`SensorParams::validate`] checks the range of every number.
-//! [`build_filter`] makes a live filter of it, [`build_smoother_with`] a smoother of whole recordings. [`PortableFilter`] is the same
-//! filter as plain numbers, for programs that write it in another language.
+//! [`build_filter`] makes a live filter from it, [`build_smoother_with`] a smoother of whole recordings. [`PortableFilter`] is the
+//! same filter as plain numbers, for programs that generate it in another language.
 //!
 //! # Policy
-//! - Knows nothing of calibration: nothing is fitted or learned here.
-//! - Reads no file and no clock. The same parameters and rows give the same estimates.
-//! - A filter that cannot be made is a [`SensorError`]; nothing panics on parameters or readings.
+//! - No calibration: nothing is fitted or learned here.
+//! - No file or clock is read. The same parameters and rows give the same estimates.
+//! - A filter that cannot be built is reported as a [`SensorError`]; no parameter or reading causes a panic.
 
 pub mod correction;
 mod error;

@@ -1,5 +1,5 @@
-/// Runs code for a law with so many branches B, whose filters have N = B + 3 states and L = N (N + 1)/2 entries of a covariance;
-/// `None` for more than four branches.
+/// Runs code for a law with B branches, whose filters have N = B + 3 states and covariances of L = N (N + 1)/2 entries; `None`
+/// for more than four branches.
 #[macro_export]
 macro_rules! with_sizes {
     ($branches:expr, $B:ident, $N:ident, $L:ident => $run:expr) => {

@@ -4,25 +4,25 @@ use ohmstrain_model::{Phase, Scalar, Symmetric};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 
-/// One path of the motion, as far as it has come.
+/// One sampled path of the motion up to now.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Particle<T, const N: usize> {
-    /// Its probability; those of a cloud sum to one.
+    /// Probability; those of a cloud sum to one.
     pub weight: T,
-    /// The phase it is in; in motion the sign of its rate.
+    /// Current phase; in motion, the sign of the rate.
     pub phase: Phase,
-    /// Strain and its derivatives as sampled; branches and baseline: their means given the path and the readings.
+    /// Sampled strain and its derivatives; means of branches and baseline given the path and the readings.
     pub state: SVector<T, N>,
 }
 
-/// Weighted paths of the motion, and what is known of branches and baseline given a path.
+/// Weighted paths of the motion, and the distribution of branches and baseline given a path.
 ///
-/// It carries its random numbers along: from equal clouds equal steps follow.
+/// It contains its random number generator, so that equal clouds give equal steps.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParticleCloud<T, const N: usize, const L: usize> {
     pub(crate) particles: Vec<Particle<T, N>>,
     /// Covariance of branches and baseline given the path: the same for every path, because neither the dynamics of
-    /// that part of the state nor its share in a reading depends on the path. Rows of the motion are zero.
+    /// that part of the state nor its contribution to a reading depends on the path. Rows of the motion are zero.
     pub(crate) covariance: Symmetric<T, N, L>,
     pub(crate) chance: Chance,
 }
@@ -34,7 +34,8 @@ impl<T: Scalar, const N: usize, const L: usize> ParticleCloud<T, N, L> {
         &self.particles
     }
 
-    /// The Gaussian with the cloud's mean and covariance: spread of the particles and what each leaves open.
+    /// Returns the Gaussian with the cloud's mean and covariance: the spread of the particles plus the covariance given
+    /// a path.
     #[must_use]
     pub fn moments(&self) -> Belief<T, N, L> {
         let (mean, spread) = weighted_moments(self.particles.iter().map(|p| (p.weight, &p.state)));
@@ -53,7 +54,7 @@ impl<T: Scalar, const N: usize, const L: usize> ParticleCloud<T, N, L> {
         probabilities
     }
 
-    /// Effective sample size `1 / Σ w²`: how many particles of equal weight the cloud is worth.
+    /// Effective sample size `1 / Σ w²`: the number of equally weighted particles with the same information.
     #[must_use]
     pub fn effective_count(&self) -> T {
         T::one() / self.particles.iter().fold(T::zero(), |sum, p| sum + p.weight * p.weight)
@@ -64,8 +65,9 @@ impl<T: Scalar, const N: usize, const L: usize> ParticleCloud<T, N, L> {
             && self.particles.iter().all(|p| p.weight.is_finite() && p.state.iter().all(|x| x.is_finite()))
     }
 
-    /// Replaces the particles by as many of equal weight. One random number places a comb of equal spacing on the
-    /// weights laid end to end: each particle is taken as often as its weight says, give or take one.
+    /// Replaces the particles by as many of equal weight (systematic resampling). One random number places a comb of
+    /// equal spacing on the weights laid end to end, so that each particle is copied in proportion to its weight, to
+    /// within one.
     ///
     /// Source: Kitagawa, *J. Comput. Graph. Stat.* 5 (1996) 1.
     pub(crate) fn resample(&mut self) {
@@ -103,7 +105,7 @@ impl<T: Scalar, const N: usize, const L: usize> State<T, N, L> for ParticleCloud
         Some(self.phase_probabilities())
     }
 
-    /// Moves the particles away from their mean: every deviation grows by the square root of `factor`.
+    /// Moves the particles away from their mean: every deviation is multiplied by the square root of `factor`.
     fn inflated(&self, factor: T) -> Self {
         let mean = self.moments().mean;
         let mut inflated = self.clone();
@@ -115,7 +117,7 @@ impl<T: Scalar, const N: usize, const L: usize> State<T, N, L> for ParticleCloud
     }
 }
 
-/// Mean and covariance of weighted points; the weights sum to one.
+/// Returns mean and covariance of weighted points; the weights sum to one.
 pub(crate) fn weighted_moments<'a, T: Scalar, const N: usize, const L: usize>(
     points: impl Iterator<Item = (T, &'a SVector<T, N>)> + Clone,
 ) -> (SVector<T, N>, Symmetric<T, N, L>) {
@@ -144,15 +146,15 @@ impl Chance {
         T::of(draw)
     }
 
-    /// The sum of these columns, each times a standard normal number: with the columns of a square root of a
-    /// covariance, a draw that has it.
+    /// Returns the sum of these columns, each times a standard normal number. For the columns of a square root of a
+    /// covariance, this is a draw with that covariance.
     pub(crate) fn combine<T: Scalar, const N: usize>(&mut self, columns: &[SVector<T, N>]) -> SVector<T, N> {
         columns.iter().fold(SVector::zeros(), |sum, column| sum + column * self.normal::<T>())
     }
 }
 
-/// Columns of a square root `L √D` of a positive semi-definite matrix, `L D Lᵀ` with unit lower triangular L; what rounding
-/// leaves of a zero pivot counts as zero.
+/// Returns the columns of a square root `L √D` of a positive semi-definite matrix, `L D Lᵀ` with unit lower triangular L;
+/// the rounding error of a zero pivot counts as zero.
 pub(crate) fn root_columns<T: Scalar, const N: usize, const L: usize>(
     matrix: &Symmetric<T, N, L>,
 ) -> [SVector<T, N>; N] {

@@ -1,4 +1,4 @@
-//! A particle filter: the oracle that the mixtures of Gaussians are compared with.
+//! A particle filter, the oracle for the mixtures of Gaussians.
 
 mod cloud;
 mod path;
@@ -16,23 +16,23 @@ use crate::particles::cloud::{Chance, root_columns};
 use crate::particles::path::{along_path, path_noise};
 use crate::particles::rejuvenation::rejuvenate;
 
-/// Rao-Blackwellised particle filter: paths of motion and phase are sampled, branches and baseline are not.
+/// Rao-Blackwellised particle filter: paths of motion and phase are sampled, branches and baseline are marginalised.
 ///
-/// The slow reference. Its only approximation besides the model's own is a finite number of paths (and, in
-/// holds, the kernel that keeps them apart), so where it is no better than [`SignSplit`](ohmstrain_ekf::SignSplit), the law
-/// limits and not the estimator.
+/// It is a slow reference. Its only approximation beyond the model's own is a finite number of paths (and, in holds, the
+/// kernel that keeps them apart). Where it is no better than [`SignSplit`](ohmstrain_ekf::SignSplit), the law is the limit,
+/// not the estimator.
 ///
 /// A particle is a strain, a rate and a phase. Given their path, branches and baseline are linear and Gaussian:
 /// each particle has a Kalman mean of them, and one covariance and one gain serve all particles. Paths follow the
 /// model's own dynamics, are weighted by the likelihood of the reading, and are resampled when the effective sample size
 /// falls below half their number.
 ///
-/// The direction is the sign of a path's rate. With a [`Dwell`] there is a hold phase besides, entered and left by the
-/// chain's probabilities; leaving it draws the rate anew from the moving phase's prior. The limits of the [`Evidence`]
-/// are stops: a path that runs into one ends its step there, at rest. That is a property of the motion and no evidence,
-/// so a rest on a limit does not weigh the same evidence again at every step.
+/// The direction is the sign of a path's rate. With a [`Dwell`] there is also a hold phase, entered and left with the
+/// chain's probabilities; on leaving it, the rate is drawn from the moving phase's prior. The limits of the
+/// [`Evidence`] are stops: a path that runs into one ends its step there, at rest. That is a property of the motion,
+/// not evidence, so a rest at a limit does not count the same evidence again at every step.
 ///
-/// Same seed and same readings, same result, on every machine.
+/// The same seed and readings give the same result on every machine.
 ///
 /// Source: Doucet, de Freitas, Murphy & Russell, *Proc. UAI* (2000) 176.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,21 +51,21 @@ pub struct ParticleStep<T, const N: usize, const L: usize> {
     pub posterior: ParticleCloud<T, N, L>,
     /// Log density of the reading under the cloud, tempered if the filter tempers; zero if it was missing.
     pub log_likelihood: T,
-    /// Squared innovation over its variance under the cloud's mean and variance; `None` if the reading was missing.
+    /// Normalised innovation squared under the cloud's mean and variance; `None` if the reading was missing.
     pub nis: Option<T>,
     /// The reading compared with the cloud's mean and variance of it; `None` if it was missing.
     pub innovation: Option<Innovation<T>>,
-    /// Effective sample size after the reading, before resampling; few means that the result is a matter of chance.
+    /// Effective sample size after the reading, before resampling; if it is small, the result is dominated by chance.
     pub effective_count: T,
 }
 
 impl<T: Scalar, M> Particles<T, M> {
-    /// - `hold`: how long holds and movements last; `None` for a body that never rests.
-    /// - `evidence`: where the body is stopped, and the power of a reading's likelihood.
-    /// - `count`: number of particles, at least 1. Chance moves the means by a share of the deviation that falls with the
-    ///   square root of `count`; with 4000 it is about a fifth while the strain is moving, so the intervals of a few
+    /// - `hold`: durations of holds and movements; `None` for a body that never rests.
+    /// - `evidence`: strains at which the body is stopped, and the power of a reading's likelihood.
+    /// - `count`: number of particles, at least 1. The random error of the means, in standard deviations, falls with the
+    ///   square root of `count`. With 4000 it is about a fifth while the strain is moving, so intervals from a few
     ///   hundred are too narrow.
-    /// - `seed`: of the random numbers.
+    /// - `seed`: seed of the random numbers.
     pub const fn new(model: M, hold: Option<Dwell<T>>, evidence: Evidence<T>, count: usize, seed: u64) -> Self {
         Self { model, hold, evidence, count, seed }
     }
@@ -77,8 +77,8 @@ impl<T: Scalar, M> Particles<T, M> {
 }
 
 impl<T: Scalar, const B: usize, const N: usize> Particles<T, SwitchedModel<T, B, N>> {
-    /// A cloud with the given moments, in `phase`: at rest in a hold (if the filter knows holds), otherwise moving, each
-    /// path in the direction of its own rate.
+    /// Draws a cloud with the given moments, in `phase`: at rest in a hold (if the filter has holds), otherwise moving,
+    /// each path in the direction of its own rate.
     ///
     /// Strains beyond the limits are moved to the limit.
     #[must_use]
@@ -110,7 +110,7 @@ impl<T: Scalar, const B: usize, const N: usize> Particles<T, SwitchedModel<T, B,
     /// Predicts over a prepared step of `dt_s ≥ 0` seconds, then takes the reading.
     ///
     /// # Errors
-    /// See [`StepError`]; the cloud passed in is untouched.
+    /// See [`StepError`]; the cloud passed in is unchanged.
     pub fn step_prepared<const L: usize>(
         &self,
         cloud: &ParticleCloud<T, N, L>,
@@ -137,7 +137,7 @@ impl<T: Scalar, const B: usize, const N: usize> Particles<T, SwitchedModel<T, B,
         Ok(ParticleStep { posterior: next, log_likelihood, nis, innovation, effective_count })
     }
 
-    /// Leads every path a step on.
+    /// Propagates every path by a step.
     fn predict<const L: usize>(&self, cloud: &mut ParticleCloud<T, N, L>, prepared: &SwitchedStep<T, B>, dt_s: T) {
         let columns = root_columns(&path_noise::<T, B, N, L>(prepared));
         let (moved, _) = columns.split_at(MOTION_STATES + B);
@@ -158,7 +158,7 @@ impl<T: Scalar, const B: usize, const N: usize> Particles<T, SwitchedModel<T, B,
         cloud.covariance = self.model.propagate(&cloud.covariance, &rest);
     }
 
-    /// Begins and ends holds.
+    /// Starts and ends holds.
     fn switch(&self, particle: &mut Particle<T, N>, chain: &[[T; 3]; 3], chance: &mut Chance) {
         let draw: T = chance.uniform();
         let [extends, stays, _] = chain[1];
@@ -184,7 +184,7 @@ impl<T: Scalar, const B: usize, const N: usize> Particles<T, SwitchedModel<T, B,
         particle.state[1] = if particle.phase == Phase::Retract { -speed } else { speed };
     }
 
-    /// Updates every particle's branches and baseline, and weighs it.
+    /// Updates every particle's branches and baseline, and its weight.
     fn take<const L: usize>(
         &self,
         cloud: &mut ParticleCloud<T, N, L>,
@@ -196,7 +196,7 @@ impl<T: Scalar, const B: usize, const N: usize> Particles<T, SwitchedModel<T, B,
         if reading.extra_variance < T::zero() {
             return Err(StepError::NegativeVariance);
         }
-        // Gain and covariance do not depend on the path: any state stands for all.
+        // Gain and covariance do not depend on the path: any state gives the same.
         let observed = self.model.observe(&SVector::zeros(), Direction::Known(Phase::Hold));
         let projected = cloud.covariance.mul(&observed.gradient);
         let variance = observed.gradient.dot(&projected) + observed.variance + reading.extra_variance;
@@ -241,7 +241,7 @@ impl<T: Scalar, const B: usize, const N: usize, const L: usize> Estimator<T, N, 
     /// The model's step, and its length for the chain of phases.
     type Prepared = (SwitchedStep<T, B>, T);
 
-    /// A path knows its direction at the ends of a step only: it needs shorter ones than a Gaussian.
+    /// A path has a direction only at the ends of a step, so it needs shorter steps than a Gaussian.
     fn longest_step_s(&self) -> T {
         self.model.longest_step_s() / T::of(8.0)
     }

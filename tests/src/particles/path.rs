@@ -1,11 +1,11 @@
 //! The model along one path of the motion. Given the path, branches and baseline are linear and Gaussian, with a covariance that
-//! depends on neither strain nor phase: that of a hold.
+//! does not depend on strain or phase; it is that of a hold.
 
 use nalgebra::SVector;
 use ohmstrain_model::{MOTION_STATES as M, Phase, Scalar, StrainRange, SwitchedModel, SwitchedStep, Symmetric};
 
-/// Covariance of what chance adds over a step to the motion, and through it to branches of unit gain, each in its
-/// place of the state. The branches' own noise is not part of it.
+/// Returns the covariance of the process noise of the motion over a step, and of its effect on branches of unit gain,
+/// in the order of the state. The branches' own noise is not included.
 pub(crate) fn path_noise<T: Scalar, const B: usize, const N: usize, const L: usize>(
     step: &SwitchedStep<T, B>,
 ) -> Symmetric<T, N, L> {
@@ -27,16 +27,17 @@ pub(crate) fn path_noise<T: Scalar, const B: usize, const N: usize, const L: usi
     out
 }
 
-/// The state after a step whose motion is given, and the direction in which the body then moves: the sign of its rate.
+/// Returns the state after a step with given motion, and the direction in which the body then moves, the sign of its
+/// rate.
 ///
-/// - `state`: strain and its derivatives as they are, means of branches and baseline given the path so far.
-/// - `phase`: what the body is about; it decides what the rate reverts to and whether the body moves at all.
+/// - `state`: strain and its derivatives, and means of branches and baseline given the path so far.
+/// - `phase`: phase of the body; it determines the rate to which the motion reverts, and whether the body moves at all.
 /// - `chance`: a draw with covariance [`path_noise`].
-/// - `stops`: strains at which the body is stopped for good, without a rebound: the rate outward is
-///   lost, and the branches are driven by that share of the step's path that the body has gone.
+/// - `stops`: strains at which the body is stopped without a rebound: the outward rate is lost, and the branches are
+///   driven by the share of the step's path that the body has completed.
 ///
-/// Branches see the gain at the middle of the strains at both ends, and of the direction in which the strain went: the
-/// rate at the end is that of an instant, and a step that turns around there has mostly gone the other way.
+/// Branches use the gain at the mean of the strains at both ends, for the direction in which the strain moved. The sign
+/// of the final rate would be wrong for a step that turns around at its end, which mostly went the other way.
 pub(crate) fn along_path<T: Scalar, const B: usize, const N: usize>(
     model: &SwitchedModel<T, B, N>,
     step: &SwitchedStep<T, B>,
@@ -76,7 +77,8 @@ pub(crate) fn along_path<T: Scalar, const B: usize, const N: usize>(
     (out, ends)
 }
 
-/// Stops a body that went from strain `start` to `state` where it left `stops`; the share of the way that it went.
+/// Stops a body that moved from strain `start` to `state` where it leaves `stops`. Returns the share of the path that
+/// it completed.
 fn stop<T: Scalar, const N: usize>(start: T, state: &mut SVector<T, N>, stops: &StrainRange<T>) -> T {
     let free = state[0];
     let stopped = stops.clamp(free);

@@ -2,25 +2,24 @@ use ohmstrain_model::{Phase, Scalar};
 
 use crate::particles::cloud::{Chance, Particle, root_columns, weighted_moments};
 
-/// Width of the kernel, in deviations of the cloud; its shrinkage a = √(1 - h²) is 0.995, which is Liu and West's
-/// discount factor (3δ - 1)/(2δ) at δ = 0.99.
+/// Width of the kernel, in standard deviations of the cloud; its shrinkage a = √(1 - h²) is 0.995, which is Liu and
+/// West's discount factor (3δ - 1)/(2δ) at δ = 0.99.
 const REACH: f64 = 0.1;
 
-/// Spreads the copies that resampling made of particles at rest.
+/// Spreads copies of resting particles, which result from resampling.
 ///
-/// In a hold nothing moves a strain. Each resampling leaves fewer different ones, until one is left and the cloud is
-/// certain of it. So every resting particle x is drawn anew from a normal kernel around a point a little nearer to the
-/// mean m of its group,
+/// In a hold, strains do not move. Each resampling leaves fewer distinct ones, until a single one is left and the cloud
+/// is certain of it. Therefore every resting particle x is redrawn from a normal kernel around a point slightly nearer
+/// to the mean m of its group,
 ///
 /// `x' = m + a (x - m) + h n`, n ~ N(0, V), `a² + h² = 1`,
 ///
-/// which keeps what the group is worth: `E[x'] = m + a (E[x] - m) = m` and `Cov[x'] = a² V + h² V = V`.
-/// V is the covariance of the whole state, so branches and baseline move with the strain the way the readings have tied
-/// them to it: their means fall as g(ε) rises by the same gains in every particle, and V has little extent across that
-/// line.
+/// which preserves the group's mean and covariance: `E[x'] = m + a (E[x] - m) = m` and `Cov[x'] = a² V + h² V = V`. V
+/// is the covariance of the whole state, so branches and baseline move with the strain as the readings have correlated
+/// them: their means fall as g(ε) rises, with the same gains in every particle, and V is narrow across that line.
 ///
-/// A group is the resting particles on one side of `border`, the static border. One mean for both sides would pull the
-/// two strains that a reading belongs to toward the strain between them, to which it does not.
+/// A group is the resting particles on one side of `border`, the static border. A common mean of both sides would pull
+/// the two strains compatible with a reading toward the strain between them, which is not.
 ///
 /// Source: Liu & West in *Sequential Monte Carlo Methods in Practice* (2001), ch. 10.
 pub(crate) fn rejuvenate<T: Scalar, const N: usize, const L: usize>(
@@ -36,7 +35,7 @@ pub(crate) fn rejuvenate<T: Scalar, const N: usize, const L: usize>(
     }
 }
 
-/// Draws each of a group of equal weights from its kernel.
+/// Redraws each particle of an equally weighted group from its kernel.
 fn spread<T: Scalar, const N: usize, const L: usize>(group: &mut [&mut Particle<T, N>], chance: &mut Chance) {
     if group.len() <= N {
         return; // fewer points than a covariance has directions

@@ -1,5 +1,5 @@
-//! Filters of phase hypotheses, written down naively: dense matrices, logarithms of weights, one hypothesis after the other.
-//! Their smoothers are in `back.rs`.
+//! Naive filters of phase hypotheses: dense matrices, logarithms of weights, one hypothesis after the other. Their smoothers
+//! are in `back.rs`.
 
 mod back;
 
@@ -21,7 +21,7 @@ pub enum Rule {
     Histories(Dwell<f64>),
 }
 
-/// A filter of a sensor, with room for so many hypotheses.
+/// A filter of a sensor, with limited room for hypotheses.
 #[derive(Clone, Copy, Debug)]
 pub struct Naive<const B: usize, const N: usize> {
     /// The sensor.
@@ -30,7 +30,7 @@ pub struct Naive<const B: usize, const N: usize> {
     pub rule: Rule,
     /// Evidence that weighs hypotheses.
     pub evidence: Evidence<f64>,
-    /// The most hypotheses.
+    /// Maximum number of hypotheses.
     pub room: usize,
 }
 
@@ -41,14 +41,14 @@ pub type Moments<const N: usize> = (SVector<f64, N>, SMatrix<f64, N, N>);
 #[derive(Clone, Copy, Debug)]
 struct Descent<const N: usize> {
     parent: usize,
-    /// Transition from the parent's state to the prediction; a rate that is drawn anew is noise.
+    /// Transition from the parent's state to the prediction; a redrawn rate is noise.
     jacobian: SMatrix<f64, N, N>,
     predicted: Moments<N>,
     posterior: Moments<N>,
     log_weight: f64,
 }
 
-/// A phase and what is known of the state if it is the right one.
+/// A phase, and the distribution of the state given it.
 #[derive(Clone, Debug)]
 pub struct Hypothesis<const N: usize> {
     /// Logarithm of its probability.
@@ -57,46 +57,46 @@ pub struct Hypothesis<const N: usize> {
     pub phase: Phase,
     /// Mean of the state.
     pub mean: SVector<f64, N>,
-    /// Its covariance.
+    /// Covariance of the state.
     pub covariance: SMatrix<f64, N, N>,
     per_inside: f64,
-    /// The children that were merged into it.
+    /// Children merged into it.
     made_of: Vec<Descent<N>>,
 }
 
-/// All hypotheses, and for how long there has been no reading.
+/// All hypotheses, and the time without a reading.
 #[derive(Clone, Debug)]
 pub struct Hypotheses<const N: usize> {
-    /// One by one.
+    /// The hypotheses.
     pub all: Vec<Hypothesis<N>>,
     pause_s: f64,
     open: bool,
 }
 
-/// Comparison of a step with the reading.
+/// Comparison of a reading with its prediction.
 #[derive(Clone, Copy, Debug)]
 pub struct Said {
-    /// Reading less its mean, and its variance.
+    /// Innovation, and its variance.
     pub innovation: (f64, f64),
-    /// Logarithm of its density.
+    /// Log density of the reading.
     pub log_density: f64,
 }
 
 impl<const N: usize> Hypotheses<N> {
-    /// One hypothesis that has all the weight.
+    /// Creates one hypothesis with all the weight.
     pub fn single<const L: usize>(belief: &Belief<f64, N, L>, phase: Phase) -> Self {
         let (mean, covariance) = (belief.mean, belief.covariance.to_matrix());
         let one = Hypothesis { log_weight: 0.0, phase, mean, covariance, per_inside: 1.0, made_of: vec![] };
         Self { all: vec![one], pause_s: 0.0, open: false }
     }
 
-    /// Mean and covariance of all.
+    /// Returns mean and covariance of the mixture.
     pub fn moments(&self) -> Moments<N> {
         moments(&self.all.iter().map(|one| (one.log_weight.exp(), one.mean, one.covariance)).collect::<Vec<_>>())
     }
 }
 
-/// Mean and covariance of weighted ones.
+/// Returns mean and covariance of weighted Gaussians.
 fn moments<const N: usize>(parts: &[(f64, SVector<f64, N>, SMatrix<f64, N, N>)]) -> Moments<N> {
     let total: f64 = parts.iter().map(|(weight, ..)| weight).sum();
     let mean = parts.iter().map(|(weight, mean, _)| mean * (weight / total)).sum::<SVector<f64, N>>();
@@ -106,7 +106,7 @@ fn moments<const N: usize>(parts: &[(f64, SVector<f64, N>, SMatrix<f64, N, N>)])
     (mean, parts.iter().map(around).sum())
 }
 
-/// Probability that a standard normal number is above z.
+/// Returns the probability that a standard normal number is above z.
 fn above(z: f64) -> f64 {
     0.5 * erfc(z / std::f64::consts::SQRT_2)
 }
@@ -131,7 +131,7 @@ impl<const N: usize> Hypothesis<N> {
         self.made_of.extend(&other.made_of);
     }
 
-    /// Keeps the rates of a phase's sign; how much that leaves.
+    /// Truncates the rate to the phase's sign, and returns the remaining probability.
     fn cut(&mut self) -> f64 {
         let side = if self.phase == Phase::Retract { -1.0 } else { 1.0 };
         let (variance, toward) = (self.covariance[(1, 1)], side * self.mean[1]);
@@ -150,7 +150,7 @@ impl<const N: usize> Hypothesis<N> {
     fn weigh_limits(&mut self, limits: &StrainRange<f64>) {
         let sd = self.covariance[(0, 0)].sqrt();
         let [lower, upper] = [limits.lower, limits.upper].map(|limit| (limit - self.mean[0]) / sd);
-        // From the side on which the tails are small.
+        // Computed on the side with small tails.
         let inside = if lower > 0.0 { above(lower) - above(upper) } else { above(-upper) - above(-lower) };
         let inside = inside.max(1e-9);
         self.log_weight += (inside * self.per_inside).ln();
@@ -158,14 +158,14 @@ impl<const N: usize> Hypothesis<N> {
     }
 }
 
-/// A child's probability, innovation, its variance, and the tempered logarithm of its density.
+/// A child's probability, innovation, innovation variance, and tempered log density.
 struct Compared(f64, f64, f64, f64);
 
 /// Children of a step.
 struct Children<const N: usize> {
     kept: Vec<Hypothesis<N>>,
     room: usize,
-    /// All children beside the reading.
+    /// All children compared with the reading.
     compared: Vec<Compared>,
 }
 
@@ -221,7 +221,7 @@ impl<const N: usize> Children<N> {
 }
 
 impl<const B: usize, const N: usize> Naive<B, N> {
-    /// One step of `dt_s` seconds. `L` is `N (N + 1) / 2`.
+    /// Takes one step of `dt_s` seconds. `L` is `N (N + 1) / 2`.
     pub fn step<const L: usize>(
         &self,
         from: &Hypotheses<N>,
@@ -260,7 +260,7 @@ impl<const B: usize, const N: usize> Naive<B, N> {
         }
     }
 
-    /// The state at the moment a moving phase begins: the rate is drawn anew.
+    /// Returns the state when a moving phase begins: the rate is redrawn.
     fn enter(&self, parent: &Hypothesis<N>, phase: Phase) -> Hypothesis<N> {
         let (mut entered, sign) = (parent.clone(), if phase == Phase::Retract { -1.0 } else { 1.0 });
         let (variance, speed) = (self.model.motion().stationary_variance()[1], self.model.motion().phase_rate());

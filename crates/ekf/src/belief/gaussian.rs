@@ -12,9 +12,10 @@ pub struct Gaussian<T> {
 }
 
 impl<T: Number> Gaussian<T> {
-    /// The same Gaussian with its mean moved into a range.
+    /// Returns the same Gaussian with its mean clamped to a range.
     ///
-    /// For reports: the moments of the restricted Gaussian are drawn off the limit, which at rest on a limit is a bias.
+    /// For reports only. The moments of a truncated Gaussian are pulled away from the limit, which is a bias for a body
+    /// at rest on a limit.
     #[must_use]
     pub fn clamped(&self, range: &StrainRange<T>) -> Self {
         Self { mean: range.clamp(self.mean), variance: self.variance }

@@ -24,7 +24,8 @@ pub struct Belief<T, const N: usize, const L: usize> {
 }
 
 impl<T: Scalar, const N: usize, const L: usize> Belief<T, N, L> {
-    /// Independent components with the given means and variances; a variance of zero means exactly known.
+    /// Builds a belief of independent components with the given means and variances; a variance of zero means exactly
+    /// known.
     #[must_use]
     pub fn independent(mean: SVector<T, N>, variance: &[T; N]) -> Self {
         Self { mean, covariance: Symmetric::from_diagonal(variance) }

@@ -3,16 +3,16 @@ use ohmstrain_model::{Scalar, Symmetric};
 
 /// `P = L D Lᵀ` of a positive semi-definite matrix: unit lower triangle and diagonal.
 ///
-/// A direction without variance has a zero pivot. It is skipped in the factor and in [`Self::solve`], which makes
-/// exactly known states ordinary input. Pivots count as zero relative to their own diagonal entry, so that units do not
-/// matter: below N ε, what rounding leaves of a zero, or below a share that the caller knows.
+/// A direction without variance has a zero pivot. It is skipped in the factor and in [`Self::solve`], so that exactly
+/// known states are valid input. A pivot counts as zero below a fraction of its own diagonal entry, so that units do
+/// not matter: N ε, the rounding error of a zero, or a fraction given by the caller.
 pub(crate) struct SemiDefinite<T, const N: usize> {
     lower: SMatrix<T, N, N>,
     pivots: SVector<T, N>,
 }
 
 impl<T: Scalar, const N: usize> SemiDefinite<T, N> {
-    /// The factor without the pivots that are no larger than `negligible` times their diagonal entry.
+    /// Returns the factor without pivots up to `negligible` times their diagonal entry.
     pub(crate) fn factor_without<const L: usize>(matrix: &Symmetric<T, N, L>, negligible: T) -> Self {
         let mut lower = SMatrix::<T, N, N>::identity();
         let mut pivots = SVector::<T, N>::zeros();
@@ -36,7 +36,7 @@ impl<T: Scalar, const N: usize> SemiDefinite<T, N> {
         Self { lower, pivots }
     }
 
-    /// A solution x of `P x = rhs` for a right-hand side in the range of P.
+    /// Returns a solution x of `P x = rhs` for a right-hand side in the range of P.
     pub(crate) fn solve(&self, rhs: &SVector<T, N>) -> SVector<T, N> {
         let mut x = *rhs;
         for i in 0..N {

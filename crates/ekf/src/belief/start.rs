@@ -2,7 +2,7 @@ use ohmstrain_model::{Scalar, SwitchedModel};
 
 use super::Belief;
 
-/// Model of a sensor that determines a filter's state: `N` and `L` follow from the model, and need not be given.
+/// Model of a sensor that determines a filter's state: `N` and `L` follow from the model and need not be specified.
 ///
 /// For up to four branches, with a baseline ([`WithBaseline`](ohmstrain_model::WithBaseline)) and without.
 ///
@@ -23,7 +23,7 @@ use super::Belief;
 /// assert_eq!(size_of::<BeliefOf<Sensor>>(), (4 + 10) * size_of::<f32>());
 /// ```
 pub trait Start {
-    /// The belief of its state.
+    /// Belief about the model's state.
     type Belief;
 
     /// Returns the belief before any reading: [`Belief::initial`].
@@ -31,7 +31,7 @@ pub trait Start {
     fn start(&self) -> Self::Belief;
 }
 
-/// Belief that a filter of a model carries.
+/// Belief of a filter for model `M`.
 pub type BeliefOf<M> = <M as Start>::Belief;
 
 macro_rules! start {

@@ -5,30 +5,30 @@ use crate::Recordable;
 pub const FEATURES: usize = 7;
 /// Time constants of the low-passes, s.
 pub const TIME_CONSTANTS_S: [f64; 6] = [0.25, 0.5, 1.0, 2.0, 8.0, 32.0];
-/// The places among them from which distances are taken.
+/// Indices of the low-passes whose difference from the reading is a feature.
 const FAR_FROM: [usize; 4] = [1, 3, 4, 5];
-/// The pairs among them whose differences are rates: of time constants τ/2 and τ.
+/// Pairs of low-passes, with time constants τ/2 and τ, whose differences are rates.
 const RATES: [(usize, usize); 2] = [(0, 1), (2, 3)];
-/// Gain of the rates' tanh: a third of the usual rate is still well distinguished from twice that.
+/// Gain of the rates' tanh, at which a third of the usual rate is still well distinguished from two thirds.
 pub const RATE_GAIN: f64 = 3.0;
 
-/// Readings farther away than this, in half ranges of the calibration's, are taken for this far: one gross error does not
-/// stay in the low-passes for minutes.
+/// Largest scaled reading, in half ranges of the calibrated readings. Readings are clamped to it, so that one gross error
+/// does not persist in the low-passes for minutes.
 pub const FARTHEST: f64 = 3.0;
 
-/// Most surprising readings in a row that are passed over as spikes. When more surprise, the law is at fault, and the
-/// features need the readings most.
+/// Maximum number of surprising readings in a row that are skipped as spikes. If there are more, the law is at fault,
+/// and the features need the readings.
 const PASSED_OVER: f64 = 3.0;
 
-/// The scale on which readings `R/R₀ - 1` are seen.
+/// Scale of the readings `R/R₀ - 1`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FeatureScale<T> {
     /// The reading that counts as zero: the middle of the range in calibration.
     pub centre: T,
-    /// Distance from there that counts as one.
+    /// Distance from `centre` that counts as one.
     pub half_range: T,
-    /// Usual size (standard deviation) of the two rates, in half ranges.
+    /// Standard deviation of the two rates, in half ranges.
     pub rates: [T; 2],
     /// Starting values of the low-passes: a and b of a + b y at the first reading y.
     pub starts: Starts<T>,
@@ -47,29 +47,29 @@ impl FeatureScale<f64> {
     }
 }
 
-/// Lines on which low-passes start.
+/// Coefficients a, b of the starting values a + b y of the low-passes.
 pub type Starts<T> = [[T; 2]; TIME_CONSTANTS_S.len()];
 
-/// All low-passes are at the first reading, as if it had been there for long.
+/// Returns the starting values of low-passes that have settled on the first reading.
 #[must_use]
 pub fn settled<T: Recordable>() -> Starts<T> {
     [[T::zero(), T::one()]; TIME_CONSTANTS_S.len()]
 }
 
-/// Features that a correction computes from the readings up to now: the scaled reading, its distances from low-passes of 0.5, 2, 8 and
-/// 32 s, and two rates, bounded by a tanh.
+/// Features that a correction computes from the readings up to now: the scaled reading, its differences from low-passes of 0.5, 2,
+/// 8 and 32 s, and two rates, bounded by a tanh.
 ///
-/// A missing reading leaves the features as they were; the next one is taken over the whole time since the last.
+/// A missing reading leaves the features unchanged; the next reading then covers the whole time since the last one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ReadingFeatures<T> {
     scale: FeatureScale<T>,
     pub(crate) low_passes: [T; TIME_CONSTANTS_S.len()],
-    /// Time since the last reading.
+    /// Time since the last reading, s.
     pub(crate) waited_s: T,
     /// Number of surprising readings in a row, three at most.
     pub(crate) surprises: T,
-    /// True if the last row had no reading, or one that was passed over.
+    /// True if the last row had no reading, or a skipped one.
     pub(crate) waits: bool,
     pub(crate) now: Option<[T; FEATURES]>,
 }
@@ -82,13 +82,13 @@ impl<T: Recordable> ReadingFeatures<T> {
         Self { scale, low_passes, waited_s: T::zero(), surprises: T::zero(), waits: false, now: None }
     }
 
-    /// Takes the reading `R/R₀ - 1` of a row `dt_s` seconds after the one before, at least zero; `None` if it is missing.
-    /// Returns the features: `None` before the first reading.
+    /// Takes the reading `R/R₀ - 1` of a row `dt_s ≥ 0` seconds after the previous row; `None` if it is missing. Returns
+    /// the features: `None` before the first reading.
     pub fn step(&mut self, dt_s: T, reading: Option<T>) -> Option<[T; FEATURES]> {
         self.step_with(dt_s, reading, |waited_s| TIME_CONSTANTS_S.map(|tau_s| Decay::over(waited_s, T::of(tau_s))))
     }
 
-    /// Takes a step as [`Self::step`] does, with the `decays` of the low-passes over a time, s.
+    /// Takes a step like [`Self::step`], with given `decays` of the low-passes as a function of time, s.
     pub fn step_with(
         &mut self,
         dt_s: T,
@@ -113,14 +113,15 @@ impl<T: Recordable> ReadingFeatures<T> {
         self.now
     }
 
-    /// Takes a step as [`Self::step`] does; a reading that surprises the filter counts as missing, unless the three readings before it did, too.
+    /// Takes a step like [`Self::step`], but a reading that surprises the filter counts as missing, unless the three readings
+    /// before it surprised it, too.
     pub fn step_unless(&mut self, surprises: bool, dt_s: T, reading: Option<T>) -> Option<[T; FEATURES]> {
         let reading = self.unless(surprises, reading);
         self.step(dt_s, reading)
     }
 
     /// Returns the reading to pass to [`Self::step`]: `None` for one that surprises the filter, unless the three readings
-    /// before it did, too.
+    /// before it surprised it, too.
     pub fn unless(&mut self, surprises: bool, reading: Option<T>) -> Option<T> {
         let (before, most) = (self.surprises, T::of(PASSED_OVER));
         let reading = reading?;
@@ -128,13 +129,13 @@ impl<T: Recordable> ReadingFeatures<T> {
         if surprises && before < most { None } else { Some(reading) }
     }
 
-    /// True if the last row had no reading, or one that was passed over.
+    /// True if the last row had no reading, or a skipped one.
     #[must_use]
     pub fn is_waiting(&self) -> bool {
         self.waits
     }
 
-    /// The features at the last reading; `None` before the first.
+    /// Returns the features at the last reading; `None` before the first.
     #[must_use]
     pub fn now(&self) -> Option<[T; FEATURES]> {
         self.now
@@ -148,14 +149,15 @@ impl<T: Recordable> ReadingFeatures<T> {
         [scaled, a, b, c, d, bounded(fast, self.scale.rates[0]), bounded(slow, self.scale.rates[1])]
     }
 
-    /// The low-passes at the last reading, in half ranges: what a calibration takes [`FeatureScale::starts`] from.
+    /// Returns the low-passes at the last reading, in half ranges, from which a calibration derives
+    /// [`FeatureScale::starts`].
     #[must_use]
     pub const fn low_passes(&self) -> [T; TIME_CONSTANTS_S.len()] {
         self.low_passes
     }
 
-    /// The two rates before they are bounded, in half ranges, of a row whose reading was the last: what a calibration
-    /// takes [`FeatureScale::rates`] from.
+    /// Returns the two rates at the last reading before the tanh, in half ranges, from which a calibration derives
+    /// [`FeatureScale::rates`].
     #[must_use]
     pub fn rates(&self) -> [T; 2] {
         RATES.map(|(sooner, later)| self.low_passes[sooner] - self.low_passes[later])

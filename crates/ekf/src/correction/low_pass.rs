@@ -1,7 +1,7 @@
 use crate::Recordable;
 
-/// Exponential low-pass, τ L′ = y − L, exact for readings that move linearly from one known reading to the next, however
-/// long the step. By default it starts settled on the first reading.
+/// Exponential low-pass, τ L′ = y − L, exact for readings that change linearly between known readings, for any step
+/// length. It starts settled on the first reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LowPass<T> {
     tau_s: T,
@@ -28,7 +28,7 @@ impl<T: Recordable> LowPass<T> {
         self.value
     }
 
-    /// Takes a reading `dt_s` seconds after the one before, at least zero, and returns the low-pass at its time.
+    /// Takes a reading `dt_s ≥ 0` seconds after the previous one, and returns the low-pass at its time.
     pub fn next(&mut self, dt_s: T, reading: T) -> T {
         self.value = self.last.map_or(reading, |last| Decay::over(dt_s, self.tau_s).moved(self.value, last, reading));
         self.last = Some(reading);
@@ -39,9 +39,9 @@ impl<T: Recordable> LowPass<T> {
 /// Decay of a low-pass over a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Decay<T> {
-    /// exp(-x), x the step in time constants.
+    /// exp(-x), with x the step in time constants.
     pub end: T,
-    /// Its mean over the step.
+    /// Mean of the decay over the step.
     pub mean: T,
 }
 
@@ -53,7 +53,7 @@ impl<T: Recordable> Decay<T> {
         Self { end: (-x).exp(), mean: if x > T::zero() { -(-x).exp_m1() / x } else { T::one() } }
     }
 
-    /// Returns the low-pass at the end of the step, readings changing linearly from one to the next.
+    /// Returns the low-pass at the end of a step in which the reading changes linearly from `last` to `reading`.
     #[must_use]
     pub fn moved(self, low_pass: T, last: T, reading: T) -> T {
         self.end * low_pass + (self.mean - self.end) * last + (T::one() - self.mean) * reading

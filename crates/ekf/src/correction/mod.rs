@@ -1,17 +1,18 @@
 //! The learned correction: strain from a filter's outputs and the readings' recent past, by two Gaussian processes.
 //!
-//! The law's error is systematic, and the strain's error that it causes can be learned from the rows that a sensor was
-//! calibrated on. A *direct* process predicts strain from features of the readings alone; a *residual* process predicts the error
-//! of the filter's strain, from the filter's outputs and the same features. A smoother has two more direct processes, one
-//! of the readings' past and one of their future: neither is as easily led astray by a motion that begins as a known one
-//! and ends as another. Their predictions are combined by [`consensus`]. Far from the training rows the residual process returns the
-//! filter's strain, its variance is no smaller than the filter's, and the mixture's grows. There a last process counts, which
-//! has learned the law's answer to motions that the sensor was not seen in. It cannot lose its way as a filter can.
+//! The law's error is systematic, so the resulting error of the strain can be learned from the calibration rows. A *direct* process
+//! predicts strain from features of the readings alone; a *residual* process predicts the error of the filter's strain, from the
+//! filter's outputs and the same features. A smoother has two more direct processes, one of the readings' past and one of their
+//! future: these are less easily misled by a motion that begins like one known motion and ends like another. Their predictions are
+//! combined by [`consensus`]. Far from the training rows, the residual process returns the filter's strain with at least the
+//! filter's variance, and the mixture's variance grows. There another process counts, trained on the law's response to simulated
+//! motions that the recordings do not contain. Unlike a filter, it cannot diverge.
 //!
 //! # Policy
-//! - Configuration, borrowed as slices that may lie in flash, is apart from state ([`ReadingFeatures`]); no heap, no panic.
-//! - Inputs are moved into the range of the training rows; how far they were outside makes the variance grow. Numbers that
-//!   are not finite come from nowhere but a filter that has failed, and give a result that is not finite.
+//! - Configuration, borrowed as slices that may lie in flash, is separate from state ([`ReadingFeatures`]); no heap, no
+//!   panic.
+//! - Inputs are clamped to the range of the training rows; the variance grows with their distance outside. Non-finite
+//!   inputs come only from a filter that has failed, and give a non-finite result.
 //! - With n rows of D inputs, m inducing rows and p processes a correction costs about n (D + p (D + exp)) + p m²/2
 //!   multiplications.
 
@@ -34,12 +35,12 @@ pub use quadratic::Quadratic;
 pub use rows::{BLOCK, InputRows, RowBlock, block_of};
 pub use triangle::{Triangle, stripe_places, stripes};
 
-/// Number of a filter's outputs that a correction sees: strain, its rate, relaxation, baseline, and the probabilities of
+/// Number of a filter's outputs that a correction uses: strain, its rate, relaxation, baseline, and the probabilities of
 /// stretching and releasing.
 pub const OUTPUTS: usize = 6;
-/// Inputs of a filter's correction: its outputs, and the features of the readings up to now.
+/// Number of inputs of a filter's correction: its outputs, and the features of the readings up to now.
 pub const FILTER_INPUTS: usize = OUTPUTS + FEATURES;
-/// The inputs of a filter's correction.
+/// Returns the inputs of a filter's correction.
 #[must_use]
 pub fn filter_inputs<T: Real>(outputs: &[T; OUTPUTS], features: &[T; FEATURES]) -> [T; FILTER_INPUTS] {
     let mut inputs = [T::zero(); FILTER_INPUTS];
@@ -47,15 +48,15 @@ pub fn filter_inputs<T: Real>(outputs: &[T; OUTPUTS], features: &[T; FEATURES]) 
     inputs
 }
 
-/// Most inducing rows.
+/// Maximum number of inducing rows.
 pub const INDUCING: usize = 64;
 
-/// Variance per square of the inputs' distance from the training range, in variances of the strain; in this distance a standard
-/// deviation of the first input that a process sees counts as one, the others by their relevance.
+/// Variance per squared distance of the inputs from the training range, in variances of the strain. In this distance a standard
+/// deviation of a process' first input counts as one, the others in proportion to their relevance.
 const FAR: f64 = 0.03;
-/// Variance of a result whose inputs are nothing like the training rows, in variances of the strain, on top of all else.
+/// Additional variance of a result whose inputs do not resemble the training rows at all, in variances of the strain.
 const NOVEL: f64 = 0.06;
-/// The square of that distance beyond which inputs are new.
+/// Squared distance over which inputs become novel.
 const NEW: f64 = 5.0;
 
 /// Distribution of an input over the training rows.
@@ -72,7 +73,7 @@ pub struct InputScale<T> {
 }
 
 impl<T: Recordable> InputScale<T> {
-    /// An input on this scale, moved into the range, and the square of how far it was outside.
+    /// Returns an input on this scale, clamped to the range, and its squared distance outside.
     #[inline(always)]
     pub(crate) fn standardised(&self, input: T) -> (T, T) {
         let inside = input.max(self.lower).min(self.upper);
@@ -81,31 +82,31 @@ impl<T: Recordable> InputScale<T> {
     }
 }
 
-/// A learned correction with D inputs: the filter's [`OUTPUTS`], then features of the readings, those of their future last.
-/// S is 2 if it has one-sided processes, a smoother's, and 0 otherwise.
+/// A learned correction with D inputs: the filter's [`OUTPUTS`], then features of the readings, those of the future last. S
+/// is 2 for a smoother's correction, which has one-sided processes, and 0 otherwise.
 #[derive(Clone, Copy, Debug)]
 pub struct Correction<'a, T, const D: usize, const S: usize = 0> {
     /// Standardised inputs of the training rows; the first are the inducing rows, at most [`INDUCING`].
     pub rows: InputRows<'a, T, D>,
     /// Scales of the inputs.
     pub scales: &'a [InputScale<T>; D],
-    /// Strain from all features; outputs of the filter are not seen, whatever their relevance.
+    /// Strain from all features; the filter's outputs are not used, whatever their relevance.
     pub direct: Process<'a, T, D>,
-    /// Strain from features of the past, and strain from features of the future. Neither sees outputs.
+    /// Strain from features of the past, and strain from features of the future. Neither uses the filter's outputs.
     pub one_sided: [OneSided<'a, T, D>; S],
     /// Strain minus the filter's strain, from all inputs.
     pub residual: Process<'a, T, D>,
-    /// Strain from the features, as the law has it where the sensor has not been.
+    /// Strain from the features, according to the law, in motions absent from the recordings.
     pub simulated: Option<Simulated<'a, T, D>>,
     /// Limits of the output.
     pub limits: StrainRange<T>,
     /// Variance of the strain over the training rows.
     pub strain_variance: T,
-    /// Factor on the mixture's variance, from training rows left out.
+    /// Factor on the mixture's variance, from held-out training rows.
     pub variance_factor: T,
 }
 
-/// A process that sees features of one side of time.
+/// A process of the features of one side of time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OneSided<'a, T, const D: usize> {
     /// The Gaussian process.
@@ -114,10 +115,10 @@ pub struct OneSided<'a, T, const D: usize> {
     pub first: usize,
 }
 
-/// A process that sees features alone, of readings that a law gave in simulated motions. Its variance is its noise.
+/// A process of features alone, trained on readings of a law in simulated motions. Its variance is its noise.
 #[derive(Clone, Copy, Debug)]
 pub struct Simulated<'a, T, const D: usize> {
-    /// Standardised inputs of the rows; outputs of a filter are not seen.
+    /// Standardised inputs of the rows; outputs of a filter are not used.
     pub rows: InputRows<'a, T, D>,
     /// Scales of the inputs.
     pub scales: &'a [InputScale<T>; D],
@@ -125,7 +126,7 @@ pub struct Simulated<'a, T, const D: usize> {
     pub process: Process<'a, T, D>,
 }
 
-/// A corrected strain and what it was made of.
+/// A corrected strain and its components.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Corrected<T, const S: usize = 0> {
     /// The result.
@@ -138,29 +139,29 @@ pub struct Corrected<T, const S: usize = 0> {
     pub residual: Gaussian<T>,
     /// Strain by the process of the simulated rows.
     pub simulated: Option<Gaussian<T>>,
-    /// Novelty: 0 if the inputs resemble the training rows, 1 if they do not at all.
+    /// Novelty: from 0 if the inputs resemble the training rows to 1 if they do not at all.
     pub novelty: T,
 }
 
 /// An input on the scale of the training rows.
 struct Standardised<T, const D: usize> {
-    /// Moved into their range.
+    /// Inputs clamped to the range of the training rows.
     inputs: [T; D],
-    /// Squares of how far it was outside.
+    /// Squared distances outside that range.
     outside: [T; D],
 }
 
 impl<T: Real, const D: usize, const S: usize> Correction<'_, T, D, S> {
     /// Corrects the strain of a filter. `inputs` are the filter's outputs, the strain first, and the features of the
-    /// readings; `filtered` is the filter's strain with its deviation; `birge` is by how much its innovations have been larger than it
-    /// states, a factor on the variance of all that has learned from it.
+    /// readings; `filtered` is the filter's strain with its variance. `birge` is the ratio of observed to stated innovation
+    /// variance, a factor on the variance of the learned strain.
     #[must_use]
     pub fn correct(&self, inputs: &[T; D], filtered: Gaussian<T>, birge: T) -> Corrected<T, S> {
         let work = Correcting { correction: self, inputs, filtered, birge };
         T::in_vectors(work).unwrap_or_else(|| work.with_lanes(T::zero()))
     }
 
-    /// Inputs on the scale of the training rows, moved into their range.
+    /// Returns the inputs on the scale of the training rows, clamped to their range.
     #[must_use]
     pub fn standardised(&self, inputs: &[T; D]) -> [T; D] {
         standardised(self.scales, inputs).inputs
@@ -192,7 +193,8 @@ impl<T: Recordable, const D: usize, const S: usize> Correction<'_, T, D, S> {
         (self.widened(predicted, &self.residual, outside, filtered), novelty)
     }
 
-    /// The residual process beside a filter: it knows no more than that one where nothing is known.
+    /// Returns the residual process for use with a filter: its variance without any information is at least that of the
+    /// filter.
     pub(crate) fn residual_beside(&self, filtered: Gaussian<T>) -> Process<'_, T, D> {
         Process { least_variance: self.residual.least_variance.max(filtered.variance), ..self.residual }
     }
@@ -204,7 +206,7 @@ impl<T: Recordable, const D: usize, const S: usize> Correction<'_, T, D, S> {
         Gaussian { mean: mixed.mean, variance: (variance * birge).min(anywhere).max(variance) }
     }
 
-    /// A process' strain on top of `base`, within the limits, with all that its variance gets.
+    /// Returns a process' strain plus `base`, within the limits, with its widened variance.
     pub(crate) fn widened(
         &self,
         predicted: Prediction<T>,
@@ -226,12 +228,12 @@ fn standardised<T: Recordable, const D: usize>(scales: &[InputScale<T>; D], inpu
     Standardised { inputs: x, outside }
 }
 
-/// An input; zero where there is none.
+/// Returns an input; zero if there is none.
 fn at<T: Recordable, const D: usize>(inputs: &[T; D], place: usize) -> T {
     inputs.get(place).copied().unwrap_or(T::zero())
 }
 
-/// The correction of one strain; training rows stand in lanes.
+/// The correction of one strain, with training rows in lanes.
 #[derive(Clone, Copy)]
 struct Correcting<'a, T, const D: usize, const S: usize> {
     correction: &'a Correction<'a, T, D, S>,
@@ -283,10 +285,10 @@ impl<T: Real, const D: usize, const S: usize> Work<T> for Correcting<'_, T, D, S
     }
 }
 
-/// Combines the members of a correction. A filter's two members are combined as a [`mixture`]. A smoother's are, too, after each member's
-/// variance has grown by the part of its squared distance from the mixture of the others that both variances do not explain. Of four
-/// members with different inputs, one that contradicts all others is more likely wrong than it states; of two, nobody knows which
-/// one is wrong.
+/// Combines the members of a correction. A filter's two members are combined as a [`mixture`]. So are a smoother's four, but first
+/// each member's variance grows by the part of its squared distance from the mixture of the others that both variances do not
+/// explain. Among four members with different inputs, one that contradicts all others is probably less accurate than it states; of
+/// two, it is unknown which one is wrong.
 #[must_use]
 pub fn consensus<T: Real, const S: usize>(
     direct: Gaussian<T>,
@@ -308,9 +310,9 @@ pub fn consensus<T: Real, const S: usize>(
     mixture([doubted(0, direct), doubted(1, residual)].into_iter().chain(sides))
 }
 
-/// Mean and variance of the mixture of Gaussians, each weighted by its variance to the power −3/2: more than the inverse
-/// variance that is due to independent members, since several may be wrong together, and the surest is the least so. One that is
-/// exact is all that counts; nothing mixed is exactly zero.
+/// Returns mean and variance of the mixture of Gaussians, each weighted by its variance to the power −3/2. That favours the most
+/// certain member more than the inverse variances of independent members do, because several may be wrong together. A member of
+/// zero variance is returned alone; without members, both numbers are zero.
 #[must_use]
 pub fn mixture<T: Recordable>(members: impl IntoIterator<Item = Gaussian<T>, IntoIter: Clone>) -> Gaussian<T> {
     let members = members.into_iter();
@@ -342,7 +344,7 @@ mod tests {
     use crate::Gaussian;
     use crate::kernel::Work;
 
-    /// Three rows more than fill vectors, inducing rows that do not.
+    /// The training rows leave a remainder of three, and the inducing rows do not fill vectors.
     #[test]
     fn vectors_of_training_rows_say_what_numbers_say() {
         const ROWS: usize = 4 * INDUCING + 3;
@@ -352,7 +354,7 @@ mod tests {
         let block = |k: usize| block_of::<_, INPUTS>(&[0, 1, 2, 3].map(|lane| row(BLOCK * k + lane))).unwrap();
         let rows: [RowBlock<f64, INPUTS>; ROWS.div_ceil(BLOCK)] = core::array::from_fn(block);
         let weights: [f64; ROWS] = core::array::from_fn(|k| number(7 * k));
-        // 21 rows: stripes of 21, 17, 13, 9, 5 columns and of one.
+        // 21 rows: stripes of 21, 17, 13, 9, 5 and 1 columns.
         let mut columns = stripes(21, |i, j| 0.2 * number(3 * (21 * i + j)));
         let explained: [[f64; BLOCK]; 66] = core::array::from_fn(|_| columns.next().unwrap());
         let process = |length: f64| Process {

@@ -6,33 +6,33 @@ use crate::{Gaussian, Real, Recordable};
 pub const LINEAR: f64 = 0.09;
 
 /// A Gaussian process conditioned on training rows with D inputs, with the kernel `exp(-Σ rᵢ (xᵢ - xᵢ')²) + 0.09 (x x' + 1)`:
-/// rᵢ is the relevance of an input, x the first that the process sees, all standardised.
+/// rᵢ is the relevance of input i, and x the process' first input, all standardised.
 ///
-/// Its mean takes all training rows. Its variance takes their kernels as weighted sums of those of the first few, the
-/// *inducing* rows (Nyström; Quiñonero-Candela & Rasmussen, *J. Mach. Learn. Res.* 6 (2005) 1939): larger than with all
-/// kernels where these rows are far, and much cheaper.
+/// Its mean uses all training rows. Its variance approximates their kernels by weighted sums of those of the first few,
+/// the *inducing* rows (Nyström; Quiñonero-Candela & Rasmussen, *J. Mach. Learn. Res.* 6 (2005) 1939): it is larger
+/// than with all kernels where these rows are far away, and much cheaper.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Process<'a, T, const D: usize> {
-    /// Relevance of each input, 1/2ℓ² with its length scale ℓ, in standard deviations of the input; 0 if it is not seen.
+    /// Relevance of each input, 1/2ℓ² with its length scale ℓ, in standard deviations of the input; 0 if it is not used.
     pub relevance: [T; D],
     /// Mean of the targets.
     pub mean: T,
     /// Weight of each training row, in the unit of the target.
     pub weights: &'a [T],
-    /// W, for kernels k of the inducing rows: |W k|² is what the training rows explain of the prior variance.
+    /// W: for kernels k of the inducing rows, |W k|² is the part of the prior variance that the training rows explain.
     pub explained: Triangle<'a, T>,
     /// Prior variance of the process where the kernel is 1.
     pub variance: T,
-    /// Variance of the noise, white and correlated in time, which is not predicted.
+    /// Variance of the unpredicted noise, white and correlated in time.
     pub noise: T,
-    /// Factor on the variance, from training rows left out.
+    /// Factor on the variance, from held-out training rows.
     pub widening: T,
-    /// The variance of the process where nothing is known is no smaller than this.
+    /// Smallest prior variance of the process.
     pub least_variance: T,
 }
 
 impl<T: Recordable, const D: usize> Process<'_, T, D> {
-    /// Returns the sum of the squared distances in each input, weighted by relevance; the one in the input `first` has weight one.
+    /// Returns the sum of the squared distances in each input, weighted by relevance relative to that of the input `first`.
     pub(crate) fn distance(&self, squares: &[T; D], first: usize) -> T {
         let sum = squares.iter().zip(&self.relevance).fold(T::zero(), |sum, (square, by)| sum + *square * *by);
         self.relevance.get(first).map_or(sum, |first| sum / *first)
@@ -49,8 +49,7 @@ impl<T: Recordable, const D: usize> Process<'_, T, D> {
 }
 
 impl<T: Real, const D: usize> Process<'_, T, D> {
-    /// Kernels with rows, of the squares of how far they are, from the first input that the process sees on, and of the product of
-    /// that one.
+    /// Returns the kernels with rows, from their squared distances in each input from `first` on, and the product of that input.
     #[inline(always)]
     pub(crate) fn kernels<V: Falls<Number = T>>(&self, squares: &[V; D], first: usize, product: V) -> V {
         let mut distance = product.nothing();
@@ -65,11 +64,11 @@ impl<T: Real, const D: usize> Process<'_, T, D> {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Prediction<T> {
     pub strain: Gaussian<T>,
-    /// Share of the prior variance that the training rows leave, 0 to 1.
+    /// Share of the prior variance that the training rows leave unexplained, 0 to 1.
     pub unknown: T,
 }
 
-/// Inducing rows in whole vectors, wherever in them the first one of a vector is.
+/// Room for the inducing rows in whole vectors, for any alignment.
 const ROOM: usize = INDUCING + MOST_LANES - 1;
 
 /// Kernels with the training rows, row by row.
@@ -85,7 +84,7 @@ impl<T: Real> Kernels<T> {
         Self { mean: process.mean, inducing: [T::zero(); ROOM], rows: 0 }
     }
 
-    /// Adds the kernels of the next training rows, `count` of which there are.
+    /// Adds the kernels of the next `count` training rows.
     #[inline(always)]
     pub(super) fn add<V: Several<Number = T>, const D: usize>(
         &mut self,
@@ -95,7 +94,7 @@ impl<T: Real> Kernels<T> {
     ) {
         let weights = process.weights.get(self.rows..self.rows + count).unwrap_or(&[]);
         let weighted = kernel.first_of(weights) * kernel;
-        // One after the other: the same sum whatever the lanes.
+        // One after the other, so that the sum does not depend on the number of lanes.
         for lane in 0..V::WIDTH {
             self.mean += weighted.at(lane);
         }
@@ -117,7 +116,7 @@ impl<T: Real> Kernels<T> {
     }
 }
 
-/// The kernel of two rows, of the sum `Σ rᵢ (xᵢ - xᵢ')²` and the product of their first inputs.
+/// Returns the kernel of two rows from the sum `Σ rᵢ (xᵢ - xᵢ')²` and the product of their first inputs.
 #[must_use]
 pub fn kernel<T: Real>(sum: T, product: T) -> T {
     (-sum).exp() + linear(product)

@@ -1,6 +1,6 @@
 use crate::Recordable;
 
-/// `Σ (lᵢ + Σⱼ≤ᵢ qᵢⱼ xⱼ) xᵢ` of standardised inputs: most of a smooth Gaussian process, at little cost.
+/// `Σ (lᵢ + Σⱼ≤ᵢ qᵢⱼ xⱼ) xᵢ` of standardised inputs: a cheap approximation of a smooth Gaussian process.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quadratic<'a, T> {
     /// lᵢ.
@@ -10,7 +10,7 @@ pub struct Quadratic<'a, T> {
 }
 
 impl<T: Recordable> Quadratic<'_, T> {
-    /// Its value, added in the order of the inputs.
+    /// Returns its value, summed in the order of the inputs.
     #[must_use]
     pub fn value(&self, x: &[T]) -> T {
         let mut square = self.square.iter();

@@ -3,7 +3,7 @@ use crate::kernel::Several;
 /// Number of rows side by side: the lanes of the vectors that [`Correction`](super::Correction) computes in.
 pub const BLOCK: usize = 4;
 
-/// Rows side by side: each of D inputs of [`BLOCK`] rows. A last block may have fewer; what is in their places does not count.
+/// Rows side by side: each of D inputs of [`BLOCK`] rows. The last block may have fewer rows; its other entries are ignored.
 pub type RowBlock<T, const D: usize> = [[T; BLOCK]; D];
 
 /// Standardised inputs of rows, in blocks; they may lie in flash.
@@ -14,18 +14,18 @@ pub struct InputRows<'a, T, const D: usize> {
 }
 
 impl<'a, T, const D: usize> InputRows<'a, T, D> {
-    /// The first `count` rows of blocks; all of them if there are fewer.
+    /// Takes the first `count` rows of blocks, or all if there are fewer.
     #[must_use]
     pub const fn new(blocks: &'a [RowBlock<T, D>], count: usize) -> Self {
         Self { blocks, count }
     }
 
-    /// Calls `see` with the rows, as many at a time as there are lanes.
+    /// Calls `see` with the rows, one vector of lanes at a time.
     #[inline(always)]
     pub(super) fn side_by_side<V: Several<Number = T>>(self, like: V, mut see: impl FnMut(SideBySide<'a, V, D>)) {
         let mut left = self.count;
         for block in self.blocks {
-            // Of a block that fills a vector the compiler knows that this goes once, from 0 on.
+            // For a block that fills a vector, the compiler sees that this loop runs once, from 0.
             let mut from = 0;
             while from < BLOCK && left > 0 {
                 let count = left.min(V::WIDTH);
@@ -46,13 +46,13 @@ pub(super) struct SideBySide<'a, V: Several, const D: usize> {
 }
 
 impl<V: Several, const D: usize> SideBySide<'_, V, D> {
-    /// An input of all of them.
+    /// Returns an input of all rows.
     #[inline(always)]
     pub(super) fn column(&self, i: usize) -> V {
         self.like.first_of(self.block.get(i).and_then(|inputs| inputs.get(self.from..)).unwrap_or(&[]))
     }
 
-    /// Squares of how far they are in an input from `x`.
+    /// Returns the squared distances of an input from `x`.
     #[inline(always)]
     pub(super) fn squares(&self, i: usize, x: V::Number) -> V {
         let apart = self.like.with(x) - self.column(i);
@@ -60,7 +60,8 @@ impl<V: Several, const D: usize> SideBySide<'_, V, D> {
     }
 }
 
-/// The block that a list of rows begins with; `None` if there are none. Where they are fewer than [`BLOCK`] the first one fills up.
+/// Returns the block of the first rows of a list; `None` if there are none. If there are fewer than [`BLOCK`], copies of the first
+/// row fill it up.
 #[must_use]
 pub fn block_of<T: Copy, const D: usize>(rows: &[[T; D]]) -> Option<RowBlock<T, D>> {
     let first = rows.first()?;

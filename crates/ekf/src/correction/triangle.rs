@@ -3,8 +3,8 @@ use ohmstrain_model::Scalar;
 use super::BLOCK;
 use crate::kernel::Several;
 
-/// An upper triangular matrix W in stripes of [`BLOCK`] rows: of each stripe the columns from the diagonal on, in which zeros
-/// stand below it. A column of a stripe is a vector, and what a row adds up stays in its lane.
+/// An upper triangular matrix W in stripes of [`BLOCK`] rows: for each stripe the columns from the diagonal on, with zeros
+/// below it. A column of a stripe is a vector, and the sum of a row stays in its lane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Triangle<'a, T> {
     columns: &'a [[T; BLOCK]],
@@ -15,7 +15,7 @@ impl<'a, T> Triangle<'a, T> {
     /// A matrix without rows.
     pub const NONE: Self = Self { columns: &[], side: 0 };
 
-    /// The matrix of `side` rows and columns with these [stripes].
+    /// Builds the matrix of `side` rows and columns from its [stripes].
     #[must_use]
     pub const fn new(columns: &'a [[T; BLOCK]], side: usize) -> Self {
         Self { columns, side }
@@ -29,8 +29,8 @@ impl<'a, T> Triangle<'a, T> {
 }
 
 impl<T: Scalar> Triangle<'_, T> {
-    /// |W k|², of as many numbers k as there are columns. Each row is added up column by column, squares row by row: the same sums
-    /// whatever the lanes.
+    /// Returns |W k|² for a vector k with one number per column. Each row is summed column by column, and squares row by row, so
+    /// that the result does not depend on the number of lanes.
     #[inline(always)]
     pub(super) fn square<V: Several<Number = T>>(&self, like: V, k: &[T]) -> T {
         let (mut square, mut columns, mut with) = (T::zero(), self.columns, k.get(..self.side).unwrap_or(&[]));
@@ -53,14 +53,14 @@ impl<T: Scalar> Triangle<'_, T> {
     }
 }
 
-/// The columns of a [`Triangle`], of its entries on and above the diagonal.
+/// Returns the columns of a [`Triangle`] from its entries on and above the diagonal.
 pub fn stripes<T: Scalar>(side: usize, entry: impl Fn(usize, usize) -> T) -> impl Iterator<Item = [T; BLOCK]> {
     stripe_places(side).map(move |(first, j)| {
         core::array::from_fn(|row| if first + row <= j { entry(first + row, j) } else { T::zero() })
     })
 }
 
-/// Returns the places of the columns of [stripes]: the first of their rows, and the column.
+/// Returns the positions of the columns of [stripes]: their first row, and the column.
 pub fn stripe_places(side: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..side).step_by(BLOCK).flat_map(move |first| (first..side).map(move |j| (first, j)))
 }

@@ -4,9 +4,10 @@ use ohmstrain_model::Scalar;
 
 use super::{Differentiable, Model};
 
-/// A model whose Jacobians come from dual numbers: exact, one run of the function per state.
+/// A model whose Jacobians come from dual numbers: they are exact, and take one evaluation of the function per state.
 ///
-/// The model is generic over its number, `impl<T: Scalar> Model<T, 2, 1> for Pendulum`, with constants as `T::of(9.81)`.
+/// The model is generic over its number type, `impl<T: Scalar> Model<T, 2, 1> for Pendulum`, with constants as
+/// `T::of(9.81)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ByDual<M>(
     /// The model.
@@ -38,7 +39,7 @@ where
     }
 }
 
-/// Column j from a run whose state moves along entry j.
+/// Returns the Jacobian; column j comes from an evaluation with a dual part in entry j.
 fn jacobian<T, const R: usize, const N: usize>(
     x: &SVector<T, N>,
     function: impl Fn(&SVector<Dual<T>, N>) -> SVector<Dual<T>, R>,

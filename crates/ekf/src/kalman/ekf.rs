@@ -3,9 +3,9 @@ use ohmstrain_model::Scalar;
 
 use super::{Affine, Differentiable, Filter, KalmanError, Normal};
 
-/// Extended Kalman filter: both functions of the model are replaced by their tangents at the mean.
+/// Extended Kalman filter: both functions of the model are linearised at the mean.
 ///
-/// A value is the filter of one step; where model, Q or R change, the next step has another one.
+/// A value is the filter of one step; if model, Q or R change, the next step needs another one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ekf<D, T, const N: usize, const M: usize> {
     /// The model's functions and Jacobians.
@@ -17,7 +17,7 @@ pub struct Ekf<D, T, const N: usize, const M: usize> {
 }
 
 impl<D, T, const N: usize, const M: usize> Ekf<D, T, N, M> {
-    /// The filter of a model with Q and R.
+    /// Creates the filter of a model with Q and R.
     #[allow(non_snake_case, reason = "the letters of every textbook")]
     pub const fn new(model: D, Q: SMatrix<T, N, N>, R: SMatrix<T, M, M>) -> Self {
         Self { model, process_noise: Q, reading_noise: R }

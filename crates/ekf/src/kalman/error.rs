@@ -1,6 +1,6 @@
 use core::fmt;
 
-/// Reason for refusing a Kalman filter's step. The distribution that was passed in is still the best there is.
+/// Reason for rejecting a Kalman filter's step. The distribution passed in is still the best available.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum KalmanError {
@@ -8,20 +8,20 @@ pub enum KalmanError {
     NonFiniteReading,
     /// The initial P is not finite, symmetric and positive semi-definite.
     InitialCovariance,
-    /// Q, or what the transition makes of the state, is not finite, or Q is not symmetric and positive semi-definite.
+    /// Q, or the transition of the state, is not finite, or Q is not symmetric and positive semi-definite.
     ProcessNoise,
     /// R, or the expected reading, is not finite, or R is not symmetric and positive semi-definite.
     ReadingNoise,
-    /// S has no inverse: neither the state nor the reading leaves any uncertainty.
+    /// S has no inverse: neither the state nor the reading has any uncertainty.
     SingularInnovation,
     /// The reading is so much more exact than the prior that rounding would change the posterior variance by more than
-    /// a thousandth: in `f32` a standard deviation 5e5 times smaller in one step, in `f64` 3e14 times.
+    /// a thousandth. The limit is a standard deviation 5e5 times smaller in one step in `f32`, and 3e14 times in `f64`.
     LostPrecision,
     /// The new state is not finite.
     NonFiniteState,
-    /// The reading's time is not finite, or before the first time that a [`Rewind`](super::Rewind) remembers.
+    /// The reading's time is not finite, or earlier than the oldest time stored in a [`Rewind`](super::Rewind).
     TimeOutOfReach,
-    /// Input and output are not of the same length.
+    /// Input and output differ in length.
     Length,
 }
 

@@ -1,8 +1,8 @@
 use nalgebra::{SMatrix, SVector};
 use ohmstrain_model::Scalar;
 
-/// A covariance C V Cᵀ: columns C over independent sources of variances V. That of a state is L D Lᵀ, with a unit lower
-/// triangle L.
+/// A covariance C V Cᵀ: columns C over independent sources of variances V. For a state it is L D Lᵀ, with a unit lower
+/// triangular L.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Factor<T, const N: usize> {
     pub(super) columns: SMatrix<T, N, N>,
@@ -14,10 +14,11 @@ impl<T: Scalar, const N: usize> Factor<T, N> {
         Self { columns: SMatrix::identity(), variances: SVector::zeros() }
     }
 
-    /// The factor of a matrix; `None` if that is not finite, symmetric and positive semi-definite to rounding.
+    /// Returns the factor of a matrix; `None` if the matrix is not finite, symmetric and positive semi-definite to
+    /// rounding.
     ///
-    /// Cholesky's elimination, at each step of the entry with the largest share of its variance left: exact to rounding for
-    /// matrices of any rank and in any units.
+    /// It is a pivoted Cholesky factorisation: each step eliminates the entry with the largest remaining share of its
+    /// variance. It is exact to rounding for matrices of any rank and in any units.
     pub(super) fn of(matrix: &SMatrix<T, N, N>) -> Option<Self> {
         let sd = matrix.diagonal().map(|variance| variance.max(T::zero()).sqrt());
         let rounding = T::default_epsilon() * T::of((8 * N) as f64);
@@ -42,12 +43,12 @@ impl<T: Scalar, const N: usize> Factor<T, N> {
         (is_finite && pairs.all(|(i, j)| is_symmetric(i, j) && is_left(i, j))).then_some(out)
     }
 
-    /// The covariance.
+    /// Returns the covariance.
     pub(super) fn matrix(&self) -> SMatrix<T, N, N> {
         self.columns * SMatrix::from_diagonal(&self.variances) * self.columns.transpose()
     }
 
-    /// Column `i` times its deviation.
+    /// Returns column `i` times its standard deviation.
     pub(super) fn column(&self, i: usize) -> SVector<T, N> {
         self.columns.column(i) * self.variances[i].sqrt()
     }

@@ -5,20 +5,20 @@ use super::factor::Factor;
 use super::rows::{Combination, Digits, Sources, orthogonalise, regress};
 use super::{KalmanError, Normal};
 
-/// A function of the state as a filter sees it, `value + slope (x − at) + noise`: a tangent, or a regression.
+/// Linear approximation of a function of the state, `value + slope (x − at) + noise`: a tangent or a regression.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Affine<T, const R: usize, const N: usize> {
-    /// State around which it holds.
+    /// Linearisation point.
     pub at: SVector<T, N>,
-    /// Its value there.
+    /// Value at `at`.
     pub value: SVector<T, R>,
-    /// Its slope: F of a transition, H of a reading.
+    /// Slope: F of a transition, H of a reading.
     pub slope: SMatrix<T, R, N>,
     pub(super) noise: Factor<T, R>,
 }
 
 impl<T: Scalar, const R: usize, const N: usize> Affine<T, R, N> {
-    /// A tangent; `None` if the noise is not a covariance or the rest not finite.
+    /// Builds a tangent; `None` if the noise is not a covariance or a number is not finite.
     pub(super) fn tangent(
         at: SVector<T, N>,
         value: SVector<T, R>,
@@ -32,13 +32,14 @@ impl<T: Scalar, const R: usize, const N: usize> Affine<T, R, N> {
         self.value.iter().chain(self.slope.iter()).copied().all(|x| x.is_finite()).then_some(self)
     }
 
-    /// Covariance of the noise: Q of a transition, R of a reading. A regression's holds what is not linear, too.
+    /// Returns the covariance of the noise: Q of a transition, R of a reading. For a regression it includes the
+    /// linearisation error.
     #[must_use]
     pub fn noise(&self) -> SMatrix<T, R, R> {
         self.noise.matrix()
     }
 
-    /// Its rows over the sources of `state` and of its own noise.
+    /// Returns its rows over the sources of `state` and of its own noise.
     pub(super) fn rows(&self, state: &Normal<T, N>) -> [Combination<T, N, R>; R] {
         core::array::from_fn(|i| Combination::of(&self.slope, &state.factor.columns, &self.noise.columns, i))
     }
@@ -52,19 +53,19 @@ impl<T: Scalar, const R: usize, const N: usize> Affine<T, R, N> {
     }
 }
 
-/// A prediction: how a step leads from one distribution to the next.
+/// Prediction: transition of a step, and the distribution after it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prediction<T, const N: usize> {
-    /// The transition, its slope F and its noise Q.
+    /// The transition, with slope F and noise Q.
     pub transition: Affine<T, N, N>,
     /// The state after it, N(x⁻, P⁻).
     pub prior: Normal<T, N>,
 }
 
-/// Results of one step. For a missing entry of the reading they are zero.
+/// Results of one step. Values that belong to a missing entry of the reading are zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step<T, const N: usize, const M: usize> {
-    /// The transition; that of an update alone stands still.
+    /// The transition; the identity for an update alone.
     pub transition: Affine<T, N, N>,
     /// The state before the reading, N(x⁻, P⁻).
     pub prior: Normal<T, N>,
@@ -76,7 +77,7 @@ pub struct Step<T, const N: usize, const M: usize> {
     pub innovation_covariance: SMatrix<T, M, M>,
     /// Kalman gain K = P⁻ Hᵀ S⁻¹.
     pub gain: SMatrix<T, N, M>,
-    /// Entries of the reading that were there.
+    /// Number of entries of the reading that are not missing.
     pub readings: usize,
     /// Normalised innovation squared νᵀ S⁻¹ ν: χ² with `readings` degrees of freedom if model and noise are right.
     pub nis: T,
@@ -84,21 +85,21 @@ pub struct Step<T, const N: usize, const M: usize> {
     pub log_likelihood: T,
 }
 
-/// Prediction and update of a Kalman filter. Filters differ in how they make a function of the state a line.
+/// Prediction and update of a Kalman filter. Filters differ in how they linearise a function of the state.
 pub trait Filter<T: Scalar, const N: usize, const M: usize> {
-    /// The transition x′ = f(x) + w as a line around N(x, P).
+    /// Returns the transition x′ = f(x) + w, linearised around N(x, P).
     ///
     /// # Errors
     /// [`KalmanError::ProcessNoise`].
     fn transition_line(&self, state: &Normal<T, N>) -> Result<Affine<T, N, N>, KalmanError>;
 
-    /// The reading y = h(x) + v as a line around N(x, P).
+    /// Returns the reading y = h(x) + v, linearised around N(x, P).
     ///
     /// # Errors
     /// [`KalmanError::ReadingNoise`].
     fn reading_line(&self, state: &Normal<T, N>) -> Result<Affine<T, M, N>, KalmanError>;
 
-    /// The state one step later: x⁻ = f(x), P⁻ = F P Fᵀ + Q.
+    /// Predicts the state one step later: x⁻ = f(x), P⁻ = F P Fᵀ + Q.
     ///
     /// # Errors
     /// See [`KalmanError`].
@@ -109,7 +110,8 @@ pub trait Filter<T: Scalar, const N: usize, const M: usize> {
         Ok(Prediction { transition, prior: Normal { mean: transition.mean(state), factor }.checked()? })
     }
 
-    /// The state after a reading, without a prediction: the first step of a filter, or a second reading at one time.
+    /// Updates with a reading, without a prediction: for the first step of a filter, or a second reading at the same
+    /// time.
     ///
     /// # Errors
     /// See [`KalmanError`].
@@ -117,13 +119,13 @@ pub trait Filter<T: Scalar, const N: usize, const M: usize> {
         condition(prior, &self.reading_line(prior)?, reading)
     }
 
-    /// Updates with the reading's line found again, `iterations` times, around the last result: the iterated
-    /// Kalman filter, Gauss and Newton's method for the most probable state. `update` is one iteration.
+    /// Updates with the reading linearised again around the last result, `iterations` times: the iterated Kalman
+    /// filter, which is the Gauss-Newton method for the most probable state. `update` is one iteration.
     ///
     /// # Errors
     /// See [`KalmanError`].
     ///
-    /// Source: Bell & Cathey, *IEEE TAC* 38 (1993) 294; with a regression García-Fernández et al., *IEEE TSP* 63 (2015)
+    /// Source: Bell & Cathey, *IEEE TAC* 38 (1993) 294; for a regression, García-Fernández et al., *IEEE TSP* 63 (2015)
     /// 5561.
     fn update_iterated(
         &self,
@@ -138,17 +140,17 @@ pub trait Filter<T: Scalar, const N: usize, const M: usize> {
         Ok(step)
     }
 
-    /// A prediction, then an update. A reading without any entry is a prediction alone.
+    /// Predicts, then updates. If all entries of the reading are missing, it only predicts.
     ///
     /// # Errors
-    /// See [`KalmanError`]; `state` is untouched.
+    /// See [`KalmanError`]; `state` is unchanged.
     fn step(&self, state: &Normal<T, N>, reading: &[Option<T>; M]) -> Result<Step<T, N, M>, KalmanError> {
         let Prediction { transition, prior } = self.predict(state)?;
         Ok(Step { transition, ..self.update(&prior, reading)? })
     }
 }
 
-/// Kalman's update: the state given the reading. With x = L s, s ~ N(0, D), the sources s are conditioned.
+/// Updates the state given the reading. With x = L s, s ~ N(0, D), it conditions the sources s.
 #[allow(non_snake_case, reason = "S and K are the letters of every textbook")]
 fn condition<T: Scalar, const N: usize, const M: usize>(
     prior: &Normal<T, N>,
@@ -175,7 +177,7 @@ fn condition<T: Scalar, const N: usize, const M: usize>(
         return Err(KalmanError::LostPrecision);
     }
 
-    // Innovations made independent of each other, in the order of the reading.
+    // Innovations, decorrelated in the order of the reading.
     let expected = line.mean(prior);
     let innovation = SVector::<T, M>::from_fn(|i, _| reading[i].map_or(T::zero(), |y| y - expected[i]));
     let independent = solve_lower(&S_factor.columns, &innovation);
@@ -213,12 +215,12 @@ fn condition<T: Scalar, const N: usize, const M: usize>(
     })
 }
 
-/// A transition over no time.
+/// Returns the transition of a step of zero length.
 fn stand_still<T: Scalar, const N: usize>(state: &Normal<T, N>) -> Affine<T, N, N> {
     Affine { at: state.mean, value: state.mean, slope: SMatrix::identity(), noise: Factor::zero() }
 }
 
-/// A solution z of L z = b for a unit lower triangle L.
+/// Returns the solution z of L z = b for a unit lower triangular L.
 pub(super) fn solve_lower<T: Scalar, const R: usize>(lower: &SMatrix<T, R, R>, b: &SVector<T, R>) -> SVector<T, R> {
     let mut z = *b;
     for i in 0..R {

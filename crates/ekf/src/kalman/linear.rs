@@ -10,7 +10,7 @@ use super::{Affine, Filter, KalmanError, Normal};
 /// y  = H x + v,        v ~ N(0, R)
 /// ```
 ///
-/// A value is the filter of one step: where something changes, the next step has another one,
+/// A value is the filter of one step; if something changes, the next step needs another one,
 /// `Kalman { control: B * u, ..kalman }`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Kalman<T, const N: usize, const M: usize> {
@@ -22,12 +22,12 @@ pub struct Kalman<T, const N: usize, const M: usize> {
     pub reading: SMatrix<T, M, N>,
     /// R.
     pub reading_noise: SMatrix<T, M, M>,
-    /// B u: what a known input adds to the state.
+    /// B u: contribution of a known input to the state.
     pub control: SVector<T, N>,
 }
 
 impl<T: Scalar, const N: usize, const M: usize> Kalman<T, N, M> {
-    /// The filter with F, Q, H and R, without control.
+    /// Creates the filter with F, Q, H and R, without control.
     #[allow(non_snake_case, reason = "the letters of every textbook")]
     pub fn new(F: SMatrix<T, N, N>, Q: SMatrix<T, N, N>, H: SMatrix<T, M, N>, R: SMatrix<T, M, M>) -> Self {
         Self { transition: F, process_noise: Q, reading: H, reading_noise: R, control: SVector::zeros() }

@@ -1,6 +1,6 @@
 use nalgebra::{ComplexField, SMatrix, SVector};
 
-/// Parameters that make readings most likely, as [`maximise`] found them.
+/// Maximum-likelihood parameters found by [`maximise`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Maximum<const P: usize> {
     /// The parameters θ.
@@ -11,18 +11,18 @@ pub struct Maximum<const P: usize> {
     pub standard_errors: SVector<f64, P>,
     /// Inverse of the observed information, (−∂²ℓ/∂θ²)⁻¹.
     pub covariance: SMatrix<f64, P, P>,
-    /// Steps taken.
+    /// Number of steps taken.
     pub iterations: usize,
 }
 
-/// Reason for finding no maximum.
+/// Reason why no maximum was found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum NoMaximum {
-    /// The log-likelihood cannot be computed where the search starts.
+    /// The log-likelihood cannot be computed at the start of the search.
     Start,
-    /// The search went this far, with this log-likelihood, and still rises: a parameter that the readings do not tell,
-    /// a variance that wants to be zero, or a start too far off.
+    /// The log-likelihood still rises at the end of the search: a parameter that the readings do not determine, a
+    /// variance whose best value is zero, or a start too far off.
     StillRising {
         /// The largest log-likelihood found.
         log_likelihood: f64,
@@ -50,13 +50,14 @@ impl core::fmt::Display for NoMaximum {
 
 impl core::error::Error for NoMaximum {}
 
-/// Steps of the search.
+/// Maximum number of steps of the search.
 const MOST_ITERATIONS: usize = 200;
-/// A step's expected gain in log-likelihood at which the search ends: a hundred-thousandth of a standard error's.
+/// Expected gain in log-likelihood at which the search ends: a step of a hundred-thousandth of a standard error.
 const ENOUGH: f64 = 1e-10;
-/// Expected gain at which the search ends where rounding hides it: a thousandth of a standard error.
+/// The same if rounding hides the gain: a step of a thousandth of a standard error.
 const ENOUGH_IN_ROUNDING: f64 = 1e-6;
-/// Variance of a parameter over what it were if the others were known. Curvatures are good to six digits.
+/// Largest ratio of a parameter's variance to its variance given the other parameters. Curvatures are accurate to six
+/// digits.
 const MOST_INFLATION: f64 = 1e6;
 /// Damping, relative to the curvature of each parameter.
 const LEAST_DAMPING: f64 = 1e-12;
@@ -66,17 +67,17 @@ const GRADIENT_STEP: f64 = 6e-6;
 /// ∜ε.
 const CURVATURE_STEP: f64 = 1.2e-4;
 
-/// Maximises a log-likelihood over P parameters by Newton's method, damped as Levenberg and Marquardt do.
+/// Maximises a log-likelihood over P parameters by Newton's method, with Levenberg-Marquardt damping.
 ///
-/// - `start`: θ where the search begins. The parameters should be of order one: logarithms of variances, not variances,
-///   which also keeps these positive.
+/// - `start`: θ at which the search begins. The parameters should be of order one: use logarithms of variances instead
+///   of variances, which also keeps variances positive.
 /// - `log_likelihood`: ℓ(θ), the sum of [`Step::log_likelihood`](super::Step::log_likelihood) over a recording; an error
 ///   or a NaN marks a θ that is not allowed.
 ///
-/// Derivatives are central differences, of steps ∛ε for the gradient and ∜ε for the curvature, times the parameter if it
-/// is larger than one: standard errors are good to about six digits. An iteration takes 2 P (P + 1) evaluations and one
-/// per damping tried. Of a function g(θ) the standard error is |g′(θ)| times that of θ: of a variance e^θ it is e^θ times as
-/// large.
+/// Derivatives are central differences, with steps of ∛ε for the gradient and ∜ε for the curvature, times the parameter if
+/// it is larger than one. Standard errors are accurate to about six digits. An iteration takes 2 P (P + 1) evaluations, and
+/// one per damping tried. The standard error of a function g(θ) is |g′(θ)| times that of θ; for a variance e^θ the factor is
+/// e^θ.
 ///
 /// # Errors
 /// See [`NoMaximum`].
@@ -99,7 +100,7 @@ pub fn maximise<E, const P: usize>(
     for iterations in 0..MOST_ITERATIONS {
         let gradient = gradient(&theta, &mut value_at);
         let information = information(&theta, value, &mut value_at);
-        // No step is left that would gain as much.
+        // A maximum is found if no remaining step would gain `enough`.
         let found = |enough: f64| {
             let covariance = information.cholesky().map(|root| root.inverse())?;
             let inflation = covariance.diagonal().component_mul(&information.diagonal());
@@ -168,7 +169,7 @@ fn moved<const P: usize>(theta: &SVector<f64, P>, by: &[(usize, f64)]) -> SVecto
     })
 }
 
-/// Inverse of the information with more on its diagonal; `None` where it is not positive.
+/// Returns the inverse of the information with a damped diagonal; `None` if that is not positive definite.
 fn damped<const P: usize>(information: &SMatrix<f64, P, P>, damping: f64) -> Option<SMatrix<f64, P, P>> {
     let more = information.diagonal().map(|own| damping * f64::max(own.abs(), LEAST_DAMPING));
     (information + SMatrix::from_diagonal(&more)).cholesky().map(|root| root.inverse())

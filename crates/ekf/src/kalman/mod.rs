@@ -1,5 +1,5 @@
-//! Kalman filters for anybody's model: linear, extended, unscented and iterated, with smoothers, delayed readings and
-//! maximum likelihood.
+//! Kalman filters for any model: linear, extended, unscented and iterated, with smoothers, delayed readings and maximum
+//! likelihood.
 //!
 //! ```text
 //! x′ = f(x) + w,  w ~ N(0, Q)      N states
@@ -40,26 +40,27 @@
 //! # Ok::<(), ohmstrain_ekf::kalman::KalmanError>(())
 //! ```
 //!
-//! - **What changes from step to step** (its length, a control input, Q, R) makes another filter of the next step:
-//!   filters are values of a few matrices, and states are passed in and returned.
-//! - **Missing entries** of a reading are `None`; the others are taken, correlated noise included. A reading of `None`
-//!   alone is a prediction.
-//! - **The first reading** is an [`update`](Filter::update) where the start is the state at that time, and a
-//!   [`step`](Filter::step) where it is the state a step before.
-//! - **Fitting**: the sum of [`Step::log_likelihood`] is what [`maximise`] makes large, with standard errors.
+//! - **What changes from step to step** (its length, a control input, Q, R) gives the next step another filter. Filters
+//!   are values of a few matrices; states are passed in and returned.
+//! - **Missing entries** of a reading are `None`; the others are used, even with correlated noise. If all entries are
+//!   `None`, the step is a prediction.
+//! - **The first reading** is an [`update`](Filter::update) if the start is the state at that time, and a
+//!   [`step`](Filter::step) if it is the state one step earlier.
+//! - **Fitting**: [`maximise`] maximises the sum of [`Step::log_likelihood`], and returns standard errors.
 //! - **Late readings**: [`Rewind`].
 //!
 //! `examples/` has six programs of forty lines at most: `constant_velocity`, `pendulum`, `nile`, `two_rates`,
-//! `late_reading` and `noise_of_a_model`; `docs/kalman.md` in the repository sets four of them beside other libraries.
+//! `late_reading` and `noise_of_a_model`; `docs/kalman.md` in the repository compares four of them with other
+//! libraries.
 //!
 //! # Policy
 //! - `no_std`, no heap, no unsafe code, no panic; `f32`, `f64` and dual numbers. Matrices are plain N × N and meant for
-//!   N and M up to 8; a step takes of the order of N³ + N² M operations and holds some ten N × N matrices on the stack.
-//! - An error leaves the caller's state as it was. Numbers that are not finite are errors.
-//! - P is kept as L D Lᵀ and never subtracted, so it stays symmetric and positive semi-definite, and a start with
-//!   P = 1e7 costs no digits in `f32`. Where a reading is so exact beside the prior that digits would be lost, the update is
-//!   refused: [`KalmanError::LostPrecision`].
-//! - Exactly known states, singular Q and exact readings are ordinary input.
+//!   N and M up to 8; a step takes about N³ + N² M operations, and holds about ten N × N matrices on the stack.
+//! - An error leaves the caller's state unchanged. Numbers that are not finite are errors.
+//! - P is stored as L D Lᵀ and never subtracted, so it stays symmetric and positive semi-definite, and a start with P = 1e7
+//!   costs no digits in `f32`. If a reading is so exact compared with the prior that digits would be lost, the update is
+//!   rejected: [`KalmanError::LostPrecision`].
+//! - Exactly known states, singular Q and exact readings are valid input.
 //!
 //! Sources: Särkkä, *Bayesian Filtering and Smoothing* (2013), chapters 4, 5 and 8; Bar-Shalom, Li & Kirubarajan,
 //! *Estimation with Applications to Tracking and Navigation* (2001), chapter 7; Bierman, *Factorization Methods for

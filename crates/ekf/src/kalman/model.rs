@@ -1,30 +1,31 @@
 use nalgebra::{SMatrix, SVector};
 use ohmstrain_model::Scalar;
 
-/// A model is two functions: of N states, and of M readings at once.
+/// Model of N states and M simultaneous readings, given by two functions.
 ///
 /// ```text
 /// x′ = f(x) + w,  w ~ N(0, Q)      transition
 /// y  = h(x) + v,  v ~ N(0, R)      reading
 /// ```
 ///
-/// A pair `(f, h)` of functions or closures is one. A type of its own holds what changes from step to step, the step's
-/// length or a control input: `Pendulum { dt_s, torque }` is the model of one step. Q and R are the filter's.
+/// A pair `(f, h)` of functions or closures is a model. A dedicated type can hold values that change from step to step,
+/// such as the step's length or a control input: `Pendulum { dt_s, torque }` is the model of one step. Q and R belong
+/// to the filter.
 pub trait Model<T: Scalar, const N: usize, const M: usize> {
-    /// f(x): the state one step after x, without noise.
+    /// Returns f(x), the state one step after x, without noise.
     fn transition(&self, x: &SVector<T, N>) -> SVector<T, N>;
 
-    /// h(x): readings expected in state x.
+    /// Returns h(x), the readings expected in state x.
     fn reading(&self, x: &SVector<T, N>) -> SVector<T, M>;
 }
 
-/// A model with its Jacobians, written by hand; `(f, F, h, H)` is one. `ByDual` (feature `dual`) finds them with dual
+/// A model with hand-written Jacobians, such as `(f, F, h, H)`. `ByDual` (feature `dual`) computes them with dual
 /// numbers.
 pub trait Differentiable<T: Scalar, const N: usize, const M: usize>: Model<T, N, M> {
-    /// F = ∂f/∂x, row i for entry i of f.
+    /// Returns F = ∂f/∂x, with row i for entry i of f.
     fn transition_jacobian(&self, x: &SVector<T, N>) -> SMatrix<T, N, N>;
 
-    /// H = ∂h/∂x, row i for reading i.
+    /// Returns H = ∂h/∂x, with row i for reading i.
     fn reading_jacobian(&self, x: &SVector<T, N>) -> SMatrix<T, M, N>;
 }
 

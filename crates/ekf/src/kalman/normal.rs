@@ -7,7 +7,7 @@ use super::rows::sum;
 
 /// Normal distribution N(x, P) of a state with N entries.
 ///
-/// P is kept as L D Lᵀ, so it is symmetric and positive semi-definite whatever is done with it.
+/// P is stored as L D Lᵀ, so it is always symmetric and positive semi-definite.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Normal<T, const N: usize> {
     /// Mean x.
@@ -16,19 +16,18 @@ pub struct Normal<T, const N: usize> {
 }
 
 impl<T: Scalar, const N: usize> Normal<T, N> {
-    /// N(x, P). A state that is known exactly has a row and a column of zeros in P.
+    /// Creates N(x, P). An exactly known state has a row and a column of zeros in P.
     ///
     /// # Errors
-    /// [`KalmanError::InitialCovariance`] where P is not a covariance, [`KalmanError::NonFiniteState`] where x is not
-    /// finite.
+    /// [`KalmanError::InitialCovariance`] if P is not a covariance, [`KalmanError::NonFiniteState`] if x is not finite.
     pub fn new(mean: SVector<T, N>, covariance: &SMatrix<T, N, N>) -> Result<Self, KalmanError> {
         let factor = Factor::of(covariance).ok_or(KalmanError::InitialCovariance)?;
         let factor = sum::<T, N, 0>(&factor, &SMatrix::zeros(), &SVector::zeros());
         Self { mean, factor }.checked()
     }
 
-    /// N(x, P) with independent entries of these variances. A large variance is a diffuse start: 1e7 costs no digits,
-    /// not even in `f32`.
+    /// Creates N(x, P) with independent entries of these variances. A large variance gives a diffuse start; 1e7 costs
+    /// no digits, not even in `f32`.
     ///
     /// # Errors
     /// As [`Self::new`].

@@ -2,25 +2,25 @@ use ohmstrain_model::Scalar;
 
 use super::{Filter, KalmanError, Normal};
 
-/// Filter for readings that arrive late or out of order: goes back to where a late reading belongs and takes the
-/// later ones again.
+/// Filter for readings that arrive late or out of order: it goes back to the time of a late reading, and takes the
+/// later readings again.
 ///
-/// `filter` makes the filter of a step from one time to another, s. The last CAPACITY readings are remembered, each with
-/// the state after it. A reading from before them is an error and changes nothing. Cost: one step per reading that is
-/// later than the one that comes.
+/// `filter` builds the filter of a step from one time to another, s. The last CAPACITY readings are stored, each with
+/// the state after it. An earlier reading is an error and changes nothing. A late reading costs one step for itself and
+/// one for every later reading.
 ///
 /// Source: Bar-Shalom, *IEEE TAES* 38 (2002) 769, where this is the optimal filter that others approximate.
 #[derive(Clone, Copy, Debug)]
 pub struct Rewind<T, B, const N: usize, const M: usize, const CAPACITY: usize> {
     filter: B,
-    /// Time and state before the first of those remembered.
+    /// Time and state before the first stored reading.
     before: (T, Normal<T, N>),
-    /// The first `count`, in the order of time.
+    /// Stored readings in order of time; the first `count` are valid.
     past: [Past<T, N, M>; CAPACITY],
     count: usize,
 }
 
-/// A reading that was taken.
+/// A stored reading.
 #[derive(Clone, Copy, Debug)]
 struct Past<T, const N: usize, const M: usize> {
     time_s: T,
@@ -40,17 +40,17 @@ where
         Self { filter, before: (time_s, start), past: [none; CAPACITY], count: 0 }
     }
 
-    /// The state after the latest reading, and its time.
+    /// Returns the time of the latest reading, and the state after it.
     #[must_use]
     pub fn latest(&self) -> (T, Normal<T, N>) {
         self.remembered().last().map_or(self.before, |last| (last.time_s, last.after))
     }
 
-    /// Takes a reading of any time since the earliest that is remembered. Of readings of one time the last to come is
-    /// taken last. Returns the state after the latest reading.
+    /// Takes a reading of any time since the earliest stored one, and returns the state after the latest reading.
+    /// Readings of the same time are taken in order of arrival.
     ///
     /// # Errors
-    /// [`KalmanError::TimeOutOfReach`], or the error of a step. Nothing has changed then.
+    /// [`KalmanError::TimeOutOfReach`], or the error of a step. The filter is then unchanged.
     pub fn take(&mut self, time_s: T, reading: [Option<T>; M]) -> Result<Normal<T, N>, KalmanError> {
         if !(time_s >= self.before.0 && time_s.is_finite()) {
             return Err(KalmanError::TimeOutOfReach);
@@ -58,7 +58,7 @@ where
         let late = Past { time_s, reading, after: self.before.1 };
         let place = self.remembered().iter().take_while(|past| past.time_s <= time_s).count();
         let is_full = self.count == CAPACITY;
-        // The oldest is forgotten; that may be the late one itself.
+        // The oldest reading is dropped, which may be the late one itself.
         let before = match (is_full, place) {
             (false, _) => self.before,
             (true, 0) => (time_s, self.after(self.before, &late)?),
@@ -84,7 +84,7 @@ where
         Ok(from.1)
     }
 
-    /// The state after a reading, from a time and the state then.
+    /// Returns the state after a reading, given an earlier time and state.
     fn after(&self, from: (T, Normal<T, N>), past: &Past<T, N, M>) -> Result<Normal<T, N>, KalmanError> {
         let filter = (self.filter)(from.0, past.time_s);
         let step = if past.time_s > from.0 {

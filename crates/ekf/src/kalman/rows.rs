@@ -1,9 +1,9 @@
 //! Gaussian variables as rows over independent sources, and their elimination.
 //!
 //! Prediction, update and smoother are one operation: the joint distribution of two vectors is factored as L D Lᵀ with
-//! the given vector first, so that what remains of the second is its conditional distribution. The factor comes from
-//! modified Gram-Schmidt with the sources' variances as weights. Covariances are never subtracted: variances of very
-//! unlike size keep their digits.
+//! the given vector first, which leaves the conditional distribution of the second. The factor comes from modified
+//! Gram-Schmidt with the sources' variances as weights. Covariances are never subtracted, so variances of very
+//! different magnitude keep their digits.
 //!
 //! Source: Thornton & Bierman, *Proc. IEEE CDC* (1976) 1205; Bierman, *Factorization Methods* (1977), chapter VI.
 
@@ -19,7 +19,7 @@ pub(super) struct Combination<T, const N: usize, const K: usize> {
     noise: Part<T, K>,
 }
 
-/// Coefficients, and the largest terms that each of them is a sum of: rounding errors are in proportion to these.
+/// Coefficients, and for each the largest term of its sum, to which its rounding error is proportional.
 #[derive(Clone, Copy)]
 struct Part<T, const N: usize> {
     value: SVector<T, N>,
@@ -33,21 +33,21 @@ pub(super) struct Sources<'a, T, const N: usize, const K: usize> {
     pub(super) noise: &'a SVector<T, K>,
 }
 
-/// Digits of a row that rounding has left.
+/// Digits of a row left after rounding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Digits {
-    /// A row as good as any.
+    /// All digits.
     Kept,
-    /// Rounding errors weigh in its variance.
+    /// Rounding errors are significant in its variance.
     Few,
-    /// Nothing but rounding errors: the variable follows from those before it.
+    /// Only rounding errors: the variable is determined by those before it.
     None,
 }
 
-/// Rounding errors of a coefficient, in ε of its terms, beyond which its row is held to be more than zero.
+/// Size of a coefficient, in ε of its terms, beyond which its row counts as nonzero.
 const ZERO_ERRORS: f64 = 8.0;
-/// A row's standard deviation has to be that many times ε of its terms': half an ε is then 1/32 of it, a thousandth
-/// of the variance.
+/// Smallest standard deviation of a row, in ε of that of its terms. Half an ε is then 1/32 of it, a thousandth of the
+/// variance.
 const FEW_ERRORS: f64 = 16.0;
 
 impl<T: Scalar, const N: usize> Part<T, N> {
@@ -77,13 +77,14 @@ impl<T: Scalar, const N: usize> Part<T, N> {
 }
 
 impl<T: Scalar, const N: usize, const K: usize> Combination<T, N, K> {
-    /// Source `i` of the state itself.
+    /// Returns source `i` of the state itself.
     pub(super) fn source(i: usize) -> Self {
         let value = SVector::from_fn(|j, _| if i == j { T::one() } else { T::zero() });
         Self { state: Part::new(value), noise: Part::new(SVector::zeros()) }
     }
 
-    /// Row `i` of `[A L | B]` for a slope A, the factor L of the state's covariance and that of a noise.
+    /// Returns row `i` of `[A L | B]` for a slope A, the factor L of the state's covariance and the factor B of the
+    /// noise.
     pub(super) fn of<const R: usize>(
         slope: &SMatrix<T, R, N>,
         lower: &SMatrix<T, N, N>,
@@ -125,7 +126,7 @@ impl<T: Scalar, const N: usize, const K: usize> Combination<T, N, K> {
     }
 }
 
-/// Makes rows independent of those before them: their covariance L D Lᵀ, and what rounding has left of each.
+/// Orthogonalises each row against those before it. Returns their covariance L D Lᵀ, and the digits left of each.
 ///
 /// A row that is not `wanted` is left out, with a pivot of zero, as if it did not exist.
 pub(super) fn orthogonalise<T: Scalar, const R: usize, const N: usize, const K: usize>(
@@ -151,7 +152,7 @@ pub(super) fn orthogonalise<T: Scalar, const R: usize, const N: usize, const K: 
     (factor, digits)
 }
 
-/// `A V Aᵀ + B W Bᵀ`, of sources of variances V and W, as L D Lᵀ.
+/// Returns `A V Aᵀ + B W Bᵀ`, for sources of variances V and W, as L D Lᵀ.
 pub(super) fn sum<T: Scalar, const R: usize, const K: usize>(
     first: &Factor<T, R>,
     more: &SMatrix<T, R, K>,
@@ -162,7 +163,8 @@ pub(super) fn sum<T: Scalar, const R: usize, const K: usize>(
     orthogonalise(&mut rows, Sources { state: &first.variances, noise: variances }, [true; R]).0
 }
 
-/// Makes rows independent of orthogonal ones: the coefficients of the regression on these. A pivot of zero tells nothing.
+/// Orthogonalises rows against `given` orthogonal rows. Returns the coefficients of the regression on these; a row with
+/// zero pivot has no effect.
 pub(super) fn regress<T: Scalar, const R: usize, const G: usize, const N: usize, const K: usize>(
     rows: &mut [Combination<T, N, K>; R],
     given: &[Combination<T, N, K>; G],

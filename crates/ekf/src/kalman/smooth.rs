@@ -5,10 +5,10 @@ use super::filter::solve_lower;
 use super::rows::{Combination, Digits, Sources, orthogonalise, regress};
 use super::{Affine, KalmanError, Normal, Step};
 
-/// Smooths a recording: the state at every step given all readings, by Rauch, Tung and Striebel's recursion.
+/// Smooths a recording by the Rauch-Tung-Striebel recursion: it estimates the state at every step given all readings.
 ///
-/// `steps` are those that a filter returned, in their order; `smoothed` has the same length. No covariance is subtracted
-/// or inverted. A direction in which the prediction is known to 16 ε of its terms is passed over.
+/// `steps` are the results of a filter, in order; `smoothed` has the same length. No covariance is subtracted or
+/// inverted. A direction in which the prediction is certain to 16 ε of its terms is skipped.
 ///
 /// # Errors
 /// [`KalmanError::Length`], [`KalmanError::NonFiniteState`].
@@ -32,11 +32,11 @@ pub fn smooth<T: Scalar, const N: usize, const M: usize>(
     Ok(())
 }
 
-/// Fixed-lag smoother: the state at the first step of a window given all readings of the window. A recording is
-/// `steps.windows(lag + 1).map(smooth_first)`; a running filter keeps its last `lag + 1` steps.
+/// Returns the state at the first step of a window given all readings of the window (fixed-lag smoother). A recording
+/// is `steps.windows(lag + 1).map(smooth_first)`; a live filter keeps its last `lag + 1` steps.
 ///
 /// # Errors
-/// [`KalmanError::Length`] of an empty window, [`KalmanError::NonFiniteState`].
+/// [`KalmanError::Length`] for an empty window, [`KalmanError::NonFiniteState`].
 pub fn smooth_first<T: Scalar, const N: usize, const M: usize>(
     window: &[Step<T, N, M>],
 ) -> Result<Normal<T, N>, KalmanError> {
@@ -47,10 +47,10 @@ pub fn smooth_first<T: Scalar, const N: usize, const M: usize>(
     })
 }
 
-/// One step backwards: N(x, P) from the readings so far, and the next state's distribution from all readings, which was
-/// predicted as `prior`.
+/// Smooths one step backwards, from N(x, P) given the readings so far, and the next state's distribution given all
+/// readings, which was predicted as `prior`.
 ///
-/// `x = x̂ + G (x′ − x⁻) + e`, where e is what the next state leaves open of this one.
+/// `x = x̂ + G (x′ − x⁻) + e`, where e is the part of this state that the next one does not determine.
 #[allow(non_snake_case, reason = "G is the letter of every textbook")]
 fn smooth_step<T: Scalar, const N: usize>(
     filtered: &Normal<T, N>,

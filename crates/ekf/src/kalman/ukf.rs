@@ -5,13 +5,15 @@ use super::factor::Factor;
 use super::rows::sum;
 use super::{Affine, Filter, KalmanError, Model, Normal};
 
-/// Unscented Kalman filter: both functions of the model go through 2 N + 1 sigma points, and no Jacobian is needed.
+/// Unscented Kalman filter: both functions of the model are evaluated at 2 N + 1 sigma points, and no Jacobian is
+/// needed.
 ///
-/// Points stand at x and x ± √N times a column of P's root, with α = 1, κ = 0, β = 2: the centre has no weight in the
-/// mean and 2 in the covariance, so that no weight is negative. New points are drawn for the reading from the prediction
-/// with its Q. The points' regression on the state is the line; what it leaves over is added to Q or R.
+/// The points are x and x ± √N times a column of P's square root, with α = 1, κ = 0, β = 2. The centre has weight 0 in
+/// the mean and 2 in the covariance, so that no weight is negative. The sigma points of the reading are new, drawn from
+/// the prediction including Q. The linear approximation is the regression on the points; its residual covariance is
+/// added to Q or R.
 ///
-/// Source: Julier & Uhlmann, *Proc. IEEE* 92 (2004) 401; as regression Särkkä (2013), §5.5 and §6.2.
+/// Source: Julier & Uhlmann, *Proc. IEEE* 92 (2004) 401; as a regression, Särkkä (2013), §5.5 and §6.2.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ukf<D, T, const N: usize, const M: usize> {
     /// The model's functions.
@@ -23,7 +25,7 @@ pub struct Ukf<D, T, const N: usize, const M: usize> {
 }
 
 impl<D, T, const N: usize, const M: usize> Ukf<D, T, N, M> {
-    /// The filter of a model with Q and R.
+    /// Creates the filter of a model with Q and R.
     #[allow(non_snake_case, reason = "the letters of every textbook")]
     pub const fn new(model: D, Q: SMatrix<T, N, N>, R: SMatrix<T, M, M>) -> Self {
         Self { model, process_noise: Q, reading_noise: R }
@@ -43,7 +45,7 @@ impl<T: Scalar, D: Model<T, N, M>, const N: usize, const M: usize> Filter<T, N, 
     }
 }
 
-/// Unscented transform of a function with noise, as its regression on the state.
+/// Returns the unscented transform of a function with noise, as its regression on the state.
 fn regression<T: Scalar, const R: usize, const N: usize>(
     state: &Normal<T, N>,
     function: impl Fn(&SVector<T, N>) -> SVector<T, R>,
@@ -61,7 +63,7 @@ fn regression<T: Scalar, const R: usize, const N: usize>(
     }
     let value = even.column_mean();
 
-    // The slope on the sources s of x = L s; back to x through L.
+    // Slope with respect to the sources s of x = L s, converted to x through L.
     let mut slope = odd;
     for i in (0..N).rev() {
         let deviation = state.factor.variances[i].sqrt() * spread;
@@ -70,7 +72,7 @@ fn regression<T: Scalar, const R: usize, const N: usize>(
         slope.set_column(i, &later);
     }
 
-    // What is not linear: pairs weigh 1/N, the centre 2.
+    // Nonlinear part: pairs have weight 1/N, the centre 2.
     let pairs = SMatrix::<T, R, N>::from_fn(|i, j| even[(i, j)] - value[i]);
     let noise = Factor::of(noise)?;
     let bend = SVector::<T, N>::repeat(T::one() / T::of(N as f64));

@@ -2,12 +2,13 @@ use ohmstrain_model::{Branch, Response, Scalar, SensorLaw, StrainRange, Switched
 
 use super::{Lanes, Regions};
 
-/// Constants of a step: all it needs besides the belief, the same for all steps of one length.
+/// Constants of all steps of one length: everything a step needs besides the belief.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct StepConstants<T, const B: usize> {
     /// Transition of the motion.
     pub motion: [[T; 2]; 2],
-    /// Coefficients of the rate's new variance: of the old variance of strain, the covariance, and the old variance of rate.
+    /// Coefficients of the rate's new variance: factors of the old variance of strain, the old covariance, and the old
+    /// variance of rate.
     pub rate_squares: [T; 3],
     /// Contribution of the pull toward the mean strain.
     pub input: [T; 2],
@@ -21,7 +22,7 @@ pub(crate) struct StepConstants<T, const B: usize> {
     pub averaging: T,
     pub branches: [BranchConstants<T, B>; B],
     pub baseline_decay: T,
-    /// Times the branches' decays, and times itself.
+    /// Products with the branches' decays; `baseline_square` is the product with itself.
     pub baseline_decays: [T; B],
     pub baseline_square: T,
     pub baseline_variance: T,
@@ -31,16 +32,16 @@ pub(crate) struct StepConstants<T, const B: usize> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct BranchConstants<T, const B: usize> {
     pub decay: T,
-    /// Times the decays of all branches.
+    /// Products with the decays of all branches.
     pub decays: [T; B],
-    /// Answer to ε and v, to the pull toward the mean strain, and to a phase's mean rate.
+    /// Response to ε and v; then to the pull toward the mean strain, and to a phase's mean rate.
     pub drive: [T; 2],
     pub input: T,
     pub phase_input: T,
-    /// Time over which a rate acts, s, and its inverse.
+    /// Effective time over which a rate acts, s, and its inverse.
     pub reach: T,
     pub per_reach: T,
-    /// The drive's direction is clear if its square is not less than this times the rate's variance.
+    /// The drive's direction is certain if its square is at least this times the rate's variance.
     pub clear: T,
     pub cross_noise: [T; 2],
     /// Covariances with the branches up to this one.
@@ -49,7 +50,8 @@ pub(crate) struct BranchConstants<T, const B: usize> {
 }
 
 impl<T: Scalar, const B: usize> StepConstants<T, B> {
-    /// Computes the constants of steps of `dt_s > 0` seconds; a rate is clear if its square is not less than `clear` variances.
+    /// Computes the constants of steps of `dt_s > 0` seconds; a rate's direction is certain if its square is at least `clear`
+    /// variances.
     pub(crate) fn new<const N: usize>(model: &SwitchedModel<T, B, N>, dt_s: T, clear: T) -> Self {
         let step = model.prepare(dt_s);
         let response: &Response<T, B> = step.response();
@@ -96,8 +98,8 @@ impl<T: Scalar, const B: usize> StepConstants<T, B> {
 
 #[cfg(feature = "record")]
 impl<T, const B: usize> StepConstants<T, B> {
-    /// Shows every number with its name, branches as `name.number`, always in the same order. Covariances of branches with
-    /// later ones are not used, and not shown.
+    /// Visits every number with its name, those of branches as `name.number`, always in the same order. Covariances of
+    /// branches with later ones are unused and not visited.
     pub(crate) fn visit(&mut self, visit: &mut impl FnMut(&'static str, usize, &mut T)) {
         let mut all = |name, numbers: &mut [T]| {
             for (i, number) in numbers.iter_mut().enumerate() {
@@ -140,7 +142,7 @@ pub(crate) struct Gains<T> {
     pub retract: Gain<T>,
 }
 
-/// A gain as a function of the sum of old and new strain: twice the strain in the middle of the step.
+/// A gain as a function of the sum of old and new strain: twice the mid-step strain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Gain<T> {
     pub at_zero: T,
@@ -161,7 +163,7 @@ impl<T: Scalar> Gain<T> {
     }
 }
 
-/// Gains of a branch at a sum of strains: each is computed when it is used.
+/// Gains of a branch at a sum of strains, computed lazily.
 #[derive(Clone, Copy)]
 pub(super) struct GainsAt<'a, V: Lanes, const B: usize> {
     regions: &'a Regions<V::Number, [Gains<V::Number>; B]>,
@@ -202,7 +204,7 @@ impl<V: Lanes, const B: usize> GainsAt<'_, V, B> {
         }
     }
 
-    /// The gain of the direction in each lane.
+    /// Returns the gain for the direction in each lane.
     #[inline(always)]
     pub(super) fn toward(&self, extends: V::Mask) -> Gain<V> {
         if let Some(row) = self.common
@@ -230,7 +232,8 @@ impl<V: Lanes, const B: usize> GainsAt<'_, V, B> {
 }
 
 impl<T: Scalar> Gains<T> {
-    /// Within the range, where gains are affine in strain, and beyond its ends, where they keep their border values.
+    /// Returns the gains within the range, where they are affine in strain, and beyond its ends, where they keep their
+    /// border values.
     pub(crate) fn by_region<const B: usize>(law: &SensorLaw<T, B>) -> Regions<T, [Self; B]> {
         let StrainRange { lower, upper } = law.range;
         let beyond = |border: T| law.branches.map(|branch| Self::of(&branch, Some(border)));

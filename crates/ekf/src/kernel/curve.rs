@@ -2,15 +2,16 @@ use ohmstrain_model::{Gauge, Scalar, StrainRange};
 
 use super::Lanes;
 
-/// The gauge curve as [`SparseEkf`](crate::SparseEkf) evaluates it: within the law's range, and along the tangent outside.
+/// Gauge curve in the form evaluated by [`SparseEkf`](crate::SparseEkf): the curve within the law's range, and its tangent
+/// outside.
 pub trait Curve<T: Scalar>: Copy {
-    /// Prepares a gauge; `None` if it is of another family than this curve.
+    /// Prepares a gauge; `None` if it is not of this curve's family.
     fn new(gauge: &Gauge<T>, range: &StrainRange<T>) -> Option<Self>;
 
-    /// g(ε) and g′(ε).
+    /// Returns g(ε) and g′(ε).
     fn value_and_slope<V: Lanes<Number = T>>(&self, strain: V) -> (V, V);
 
-    /// Returns the line that stands for g where strain has a variance; by default the tangent at the mean.
+    /// Returns the line that approximates g for a strain with this variance; by default the tangent at the mean.
     #[inline(always)]
     fn line<V: Lanes<Number = T>>(&self, strain: V, _variance: V) -> CurveLine<V> {
         let (value, slope) = self.value_and_slope(strain);
@@ -25,11 +26,11 @@ pub struct CurveLine<V> {
     pub value: V,
     /// Slope.
     pub slope: V,
-    /// Variance of what the line leaves over, if that is known.
+    /// Variance of the residual of the line, if known.
     pub left: Option<V>,
 }
 
-/// Any gauge, chosen while running.
+/// Any gauge, selected at run time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AnyCurve<T> {
     gauge: Gauge<T>,
@@ -43,7 +44,7 @@ impl<T: Scalar> Curve<T> for AnyCurve<T> {
 
     #[inline(always)]
     fn value_and_slope<V: Lanes<Number = T>>(&self, strain: V) -> (V, V) {
-        // By comparisons, which cost less than calls of `fmax` and `fmin`.
+        // Comparisons cost less than calls of `fmax` and `fmin`.
         let (lower, upper) = (strain.with(self.range.lower), strain.with(self.range.upper));
         let inside = V::pick(strain.less(lower), lower, V::pick(upper.less(strain), upper, strain));
         let (value, slope) = gauge_in_lanes(&self.gauge, inside);
@@ -51,7 +52,7 @@ impl<T: Scalar> Curve<T> for AnyCurve<T> {
     }
 }
 
-/// [`Gauge::value_and_slope`] in lanes.
+/// Computes [`Gauge::value_and_slope`] in lanes.
 #[inline(always)]
 fn gauge_in_lanes<V: Lanes>(gauge: &Gauge<V::Number>, strain: V) -> (V, V) {
     let number = |number| strain.with(number);
@@ -76,7 +77,7 @@ fn gauge_in_lanes<V: Lanes>(gauge: &Gauge<V::Number>, strain: V) -> (V, V) {
     }
 }
 
-/// [`Gauge::Polynomial`] and nothing else: no exponential in the program, and no choice while running.
+/// [`Gauge::Polynomial`] only: the program contains no exponential, and nothing is selected at run time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cubic<T> {
     regions: Regions<T, [T; 4]>,
@@ -105,15 +106,15 @@ impl<T: Scalar> Curve<T> for Cubic<T> {
             };
         }
         let [a0, a1, a2, a3] = coefficients;
-        // Horner's scheme; the slope is the scheme applied to its own results.
+        // Horner's scheme; the slope comes from the scheme applied to its own coefficients.
         let b2 = strain.mul_add(a3, a2);
         let b1 = strain.mul_add(b2, a1);
         (strain.mul_add(b1, a0), strain.mul_add(strain.mul_add(a3, b2), b1))
     }
 }
 
-/// A gauge seen through the unscented transform: three points of strain, at the mean (weight 2/3) and √3 deviations to either
-/// side (1/6 each), which have the moments of a normal distribution up to the fifth. Nothing but the gauge is curved, so that a
+/// Unscented transform of a gauge: three points of strain, at the mean (weight 2/3) and √3 standard deviations to either side
+/// (1/6 each). They match the moments of a normal distribution up to the fifth. Only the gauge is nonlinear, so a
 /// [`SparseEkf`](crate::SparseEkf) with this curve is the unscented Kalman filter.
 ///
 /// Source: Julier & Uhlmann, *Proc. IEEE* 92 (2004) 401, with one dimension and κ = 2.
@@ -146,7 +147,7 @@ impl<T: Scalar, G: Curve<T>> Curve<T> for SigmaPoints<G> {
     }
 }
 
-/// Values for places below, within and above a range: outside of it a law goes on with numbers of its own, not by clamping.
+/// Values for positions below, within and above a range; outside it a law has separate numbers instead of clamping.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Regions<T, V> {
     lower: T,
@@ -161,13 +162,13 @@ impl<T: Scalar, V> Regions<T, V> {
         Self { lower: range.lower, upper: range.upper, within, below, above }
     }
 
-    /// Returns the value of all places if they share one; the value within the range if a place is NaN.
+    /// Returns the value for all positions if they share one; NaN counts as within the range.
     #[inline(always)]
     pub(crate) fn common<L: Lanes<Number = T>>(&self, places: L) -> Option<&V> {
         places.region(self.lower, self.upper, [&self.below, &self.within, &self.above])
     }
 
-    /// Chooses, at each place, among numbers for below, within and above the range.
+    /// Selects, at each position, among numbers for below, within and above the range.
     #[inline(always)]
     pub(crate) fn chosen<L: Lanes<Number = T>>(&self, places: L, [below, within, above]: [T; 3]) -> L {
         let (is_below, is_above) = (places.less(places.with(self.lower)), places.with(self.upper).less(places));

@@ -1,19 +1,20 @@
-//! Exponentials of what is not above zero, with the same bits on every machine, and what hypotheses make of them.
+//! Exponentials of numbers up to zero, with the same bits on every machine, and normal tails for hypotheses.
 
 use super::tail::Tail;
 use super::{InVectors, Lanes, Several};
 
 /// Constants of `2ⁿ eʳ` in one precision.
 pub(crate) struct Falling<T: 'static> {
-    /// Exponentials of less are zero.
+    /// Smallest argument; below it the exponential is zero.
     pub least: T,
-    /// Added to a number, 1.5 · 2ᵐ plus the exponent's bias leaves the nearest integer, plus that bias, in the lowest of m bits.
+    /// 1.5 · 2ᵐ plus the exponent's bias. Added to a number, it leaves the nearest integer, plus that bias, in the lowest bits
+    /// of the mantissa.
     pub rounds: T,
-    /// ln 2 in two parts, as fdlibm and Cephes have it: the first has so few bits that its products with n are exact.
+    /// ln 2 in two parts, as in fdlibm and Cephes; the first has so few bits that its products with n are exact.
     pub ln_2: [T; 2],
-    /// 1/k!, as far as Taylor's series goes.
+    /// Coefficients 1/k! of the Taylor series.
     pub series: &'static [T],
-    /// m.
+    /// Number m of bits of the mantissa.
     pub mantissa: u32,
 }
 
@@ -28,7 +29,7 @@ pub(super) const INVERSE_FACTORIALS: [f64; 14] = {
     inverses
 };
 
-/// Inverse factorials up to k = 7, in single precision; constants, since a program need not compute them.
+/// Inverse factorials up to k = 7, in single precision; constants, so that no program computes them.
 pub(super) const INVERSE_FACTORIALS_F32: [f32; 8] = {
     let mut inverses = [1.0; 8];
     let mut k = 1;
@@ -39,13 +40,13 @@ pub(super) const INVERSE_FACTORIALS_F32: [f32; 8] = {
     inverses
 };
 
-/// Lanes with the exponentials and tails that hypotheses and corrections take.
+/// Lanes with the exponentials and tails that hypotheses and corrections need.
 pub(crate) trait Falls: Lanes<Number: InVectors> {
-    /// 2ⁿ of a number in whose lowest bits n stands, plus the exponent's bias.
+    /// Returns 2ⁿ for a number with n, plus the exponent's bias, in its lowest bits.
     #[must_use]
     fn to_exponent(self) -> Self;
 
-    /// Exponentials of what is not above zero.
+    /// Returns the exponentials of numbers up to zero.
     #[must_use]
     #[inline(always)]
     fn falling(self) -> Self {
@@ -89,8 +90,8 @@ pub(crate) fn exponential<V: Falls>(exponents: V) -> V {
 mod tests {
     use super::Falls;
 
-    /// The reduced argument is off by half a rounding of 0.35, the series by one of each of 1 and 0.35 and by r times what
-    /// its inner sums are off by; the result is 0.7 or more. libm's is off by one.
+    /// The error of the reduced argument is half a rounding of 0.35. That of the series is one rounding of 1, one of 0.35,
+    /// and r times the error of its inner sums. The result is 0.7 or more. libm's error is one rounding.
     #[test]
     fn exponentials_of_what_is_not_above_zero() {
         for k in 0..70_800 {

@@ -2,7 +2,7 @@ use core::ops::{Add, AddAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
 use ohmstrain_model::Scalar;
 
-/// Numbers that the kernel computes with: a scalar, or a vector with a number of another sensor or hypothesis in each lane.
+/// Number type of the kernel: a scalar, or a vector with one number per lane, each of another sensor or hypothesis.
 pub trait Lanes:
     Copy
     + Add<Output = Self>
@@ -15,25 +15,25 @@ pub trait Lanes:
 {
     /// Number in one lane.
     type Number: Scalar;
-    /// A truth for every lane.
+    /// A truth value for every lane.
     type Mask: Copy;
 
     /// Number of lanes.
     const WIDTH: usize;
 
-    /// Returns the same number in all lanes, of which there are as many as here.
+    /// Returns `number` in all lanes.
     #[must_use]
     fn with(self, number: Self::Number) -> Self;
-    /// `self · factor + term`, in one rounding where the processor does that for vectors.
+    /// Returns `self · factor + term`, with a single rounding if the processor fuses it for vectors.
     #[must_use]
     fn mul_add(self, factor: Self, term: Self) -> Self;
-    /// One over each.
+    /// Returns the reciprocals.
     #[must_use]
     fn recip(self) -> Self;
-    /// Quotients.
+    /// Returns the quotients.
     #[must_use]
     fn over(self, divisor: Self) -> Self;
-    /// Square roots.
+    /// Returns the square roots.
     #[must_use]
     fn root(self) -> Self;
     /// Lanes where `self` is less than `other`.
@@ -52,14 +52,15 @@ pub trait Lanes:
     fn none(mask: Self::Mask) -> bool;
     /// True if the mask is set in all lanes.
     fn all(mask: Self::Mask) -> bool;
-    /// `yes` where the mask is true, else `no`.
+    /// Returns `yes` in lanes where the mask is set, otherwise `no`.
     fn pick(mask: Self::Mask, yes: Self, no: Self) -> Self;
-    /// Exponentials.
+    /// Returns the exponentials.
     #[must_use]
     fn exponential(self) -> Self;
     /// Returns `yes` if the mask is set in all lanes, `no` if in none, and `None` otherwise.
     fn one_of<'a, R>(mask: Self::Mask, yes: &'a R, no: &'a R) -> Option<&'a R>;
-    /// Returns the row for below, within or above a range if the same row applies to all lanes; NaN counts as within.
+    /// Returns the row for below, within or above a range if the same row applies to all lanes, otherwise `None`. NaN
+    /// counts as within.
     fn region<R>(self, lower: Self::Number, upper: Self::Number, rows: [&R; 3]) -> Option<&R>;
 
     /// `self · factor + term` with the same factor for all.
@@ -168,7 +169,7 @@ impl<T: Scalar> Lanes for T {
         if mask { yes } else { no }
     }
 
-    /// Computes the exponential, never inlined: a compiler that knows it may compute it for gauges that have none.
+    /// Computes the exponential. Never inlined: otherwise a compiler may compute it even for gauges without one.
     #[inline(never)]
     fn exponential(self) -> T {
         self.exp()
@@ -191,7 +192,8 @@ impl<T: Scalar> Lanes for T {
     }
 }
 
-/// A vector register, or as many as hold a row. It fuses products with sums unless it is to give the bits of a number.
+/// A vector register, or as many as hold a row. It fuses products with sums unless it must give the same bits as
+/// scalars.
 #[cfg(feature = "simd")]
 #[cfg_attr(
     not(any(target_arch = "x86_64", target_feature = "simd128")),

@@ -1,11 +1,11 @@
-//! The sensor's step: predict, cut, renew, compare, update. It stands here once, for numbers and for vectors of them.
+//! The sensor's step: predict, truncate, renew, compare, update. One source serves scalars and vectors.
 //!
 //! # Policy
-//! - A [`Lanes`] is a number or a vector. Where lanes may go different ways, all ways that some lane goes are computed and the
-//!   results chosen; where the mask is a `bool`, that is a branch.
-//! - Everything is `#[inline(always)]`, and loops run over constant sizes: code in closures that is not inlined would not use the
-//!   vector instructions of its caller.
-//! - Multiplications and additions are rounded one by one, in the order in which they are written; vectors fuse them where the
+//! - A [`Lanes`] is a scalar or a vector. If lanes take different branches, every branch taken by some lane is computed and
+//!   the results are selected per lane. If the mask is a `bool`, that is an ordinary branch.
+//! - Everything is `#[inline(always)]`, and loops run over constant sizes: code in closures that are not inlined would not use
+//!   the vector instructions of its caller.
+//! - Multiplications and additions are rounded one by one, in the order in which they are written; vectors fuse them if the
 //!   processor can.
 
 mod constants;

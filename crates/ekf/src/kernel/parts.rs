@@ -4,7 +4,7 @@ use ohmstrain_model::{Scalar, Symmetric};
 use super::{Lanes, Several};
 use crate::Belief;
 
-/// A belief taken apart into motion, branches and baseline: each moves in its own way, no index needs a check, and with one
+/// A belief split into motion, branches and baseline. Each propagates differently, no index needs a check, and with one
 /// branch there is no loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Parts<T, const B: usize> {
@@ -15,7 +15,7 @@ pub(crate) struct Parts<T, const B: usize> {
     pub strain_rate: T,
     pub rate_variance: T,
     pub branches: [Part<T, B>; B],
-    /// Means nothing where there is no baseline.
+    /// Meaningless if there is no baseline.
     pub baseline: Part<T, B>,
 }
 
@@ -25,12 +25,12 @@ pub(crate) struct Part<T, const B: usize> {
     pub mean: T,
     pub with_strain: T,
     pub with_rate: T,
-    /// Covariances with the branches: of a branch those before it, of the baseline all.
+    /// Covariances with the branches: for a branch, with those before it; for the baseline, with all.
     pub with: [T; B],
     pub variance: T,
 }
 
-/// Takes numbers one after another. Their count is known while compiling, so that no test of an end is left.
+/// Takes numbers one after another. Their count is known at compile time, so that no test for the end remains.
 #[inline(always)]
 fn next<'a, V: Lanes + 'a>(numbers: &mut impl Iterator<Item = &'a V>, nothing: V) -> V {
     match numbers.next() {
@@ -66,7 +66,7 @@ impl<V: Lanes, const B: usize> Part<V, B> {
         part
     }
 
-    /// Writes into what [`Self::read`] has read from.
+    /// Writes to the layout that [`Self::read`] reads.
     #[inline(always)]
     fn write<'a>(
         &self,
@@ -94,7 +94,7 @@ fn put<'a, V: Lanes + 'a>(places: &mut impl Iterator<Item = &'a mut V>, number: 
 }
 
 impl<V: Lanes, const B: usize> Parts<V, B> {
-    /// Returns parts that are all known to be `nothing`.
+    /// Returns parts that are exactly zero (`nothing`).
     pub(crate) const fn certain(nothing: V) -> Self {
         Self {
             strain: nothing,
@@ -158,7 +158,7 @@ impl<V: Lanes, const B: usize> Parts<V, B> {
         }
     }
 
-    /// Lanes where a step has left valid numbers: no variance is negative, and nothing is infinite or NaN. `extra` is another number
+    /// Lanes with valid numbers after a step: no variance is negative, and nothing is infinite or NaN. `extra` is another number
     /// that must be finite.
     #[inline(always)]
     pub(crate) fn is_sound<const N: usize>(&self, extra: V) -> V::Mask {
@@ -172,7 +172,7 @@ impl<V: Lanes, const B: usize> Parts<V, B> {
             positive = V::both(positive, self.baseline.variance.not_negative());
             sum += self.baseline.mean;
         }
-        // Whatever is not finite makes the sum not finite.
+        // Any non-finite number makes the sum non-finite.
         V::both(positive, sum.finite())
     }
 
@@ -195,7 +195,7 @@ impl<V: Lanes, const B: usize> Parts<V, B> {
     expect(dead_code, reason = "only vectors ask")
 )]
 impl<V: Several, const B: usize> Parts<V, B> {
-    /// Gathers as many beliefs as there are lanes.
+    /// Gathers one belief per lane.
     #[inline(always)]
     pub(crate) fn gathered<'a, const N: usize, const L: usize>(
         like: V,
@@ -215,7 +215,7 @@ impl<V: Several, const B: usize> Parts<V, B> {
         Self::read::<N>(&mut means.iter(), &mut covariances.iter(), nothing)
     }
 
-    /// The numbers in a lane.
+    /// Returns the numbers in a lane.
     #[inline(always)]
     pub(crate) fn in_lane(&self, lane: usize) -> Parts<V::Number, B> {
         let mut branches = [Part::vacant(<V::Number as Scalar>::of(0.0)); B];
@@ -257,7 +257,7 @@ impl<T: Scalar, const B: usize> Parts<T, B> {
         Self::read::<N>(&mut belief.mean.iter(), &mut belief.covariance.packed().iter(), T::zero())
     }
 
-    /// A belief of these parts.
+    /// Returns the belief composed of these parts.
     #[inline(always)]
     pub(crate) fn together<const N: usize, const L: usize>(&self) -> Belief<T, N, L> {
         let mut belief = Belief { mean: SVector::zeros(), covariance: Symmetric::zeros() };

@@ -1,28 +1,29 @@
-//! The prediction, in place. Sums are written with what does not depend on the belief first.
+//! The prediction, in place. In sums, terms that do not depend on the belief come first.
 
 use ohmstrain_model::{LEAST_LEFT, Phase, Scalar, Turning};
 
 use super::constants::{BranchConstants, Gain, GainsAt, StepConstants};
 use super::{Lanes, Part, Parts, RateSpread, SparseEkf, Switch};
 
-/// Effect of a step on one branch. The gain grows with the sum of old and new strain: the old one's share is in `row`, the
-/// new one's is added when its covariances are known.
+/// Effect of a step on one branch. The gain grows with the sum of old and new strain: the contribution of the old strain
+/// is in `row`, that of the new one is added once its covariances are known.
 #[derive(Clone, Copy)]
 pub(super) struct Driven<V> {
     change: V,
     gain: V,
     /// Growth of the change with old or new strain.
     pub pull: V,
-    /// Answer to old strain and rate.
+    /// Response to old strain and rate.
     pub row: [V; 2],
-    /// Decayed covariances with old strain and rate, and these with what the motion adds.
+    /// Decayed covariances with old strain and rate; then the same plus the contribution of the motion.
     kept: [V; 2],
     carried: [V; 2],
-    /// Change that a unit of path in the other direction would have caused.
+    /// Difference of the change between both directions, per unit of path.
     jump: V,
 }
 
-/// Drive of a branch: its change, gain and pull; its jump, and the variance of the rate's split, if the direction is open.
+/// Drive of a branch: its change, gain and pull; for an uncertain direction also its jump, and the variance of the rate's
+/// split.
 #[derive(Clone, Copy)]
 struct Drive<V> {
     change: V,
@@ -35,23 +36,24 @@ struct Drive<V> {
 /// Drives of all branches.
 pub(super) struct Driving<V, const B: usize> {
     drives: [Drive<V>; B],
-    /// Variance of the path whose direction stays open.
+    /// Variance of the path due to the uncertain direction.
     unexplained: V,
 }
 
-/// Knowledge of the direction of a step that moves.
+/// Information about the direction of a step.
 #[derive(Clone, Copy)]
 pub(crate) enum Course<V> {
-    /// Nothing but the rate's distribution.
+    /// Only the rate's distribution.
     Uncertain,
     /// A hypothesis.
     Known(Phase),
-    /// A hypothesis of both ends of the step: the phase at its end, and what turning around on the way adds.
+    /// A hypothesis about both ends of the step: the phase at its end, and the excess path of turning around in
+    /// between.
     Within(Phase, Turning<V>),
 }
 
 impl<V> Course<V> {
-    /// An input, and what the mean rate of a moving phase adds to it.
+    /// Returns an input plus the contribution of a moving phase's mean rate.
     #[inline(always)]
     fn input(&self, like: V, toward_strain: V::Number, toward_rate: V::Number) -> V
     where
@@ -88,8 +90,8 @@ fn pair<V: Lanes>(like: V, [a, b]: [V::Number; 2]) -> [V; 2] {
 impl<T: Scalar, S, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
     pub(crate) const HAS_BASELINE: bool = Parts::<T, B>::has_baseline(N);
 
-    /// Predicts one step ahead. With an uncertain course every branch splits its rate by the variance of the rate in the middle
-    /// of the step. What is returned is for the reading's split.
+    /// Predicts one step ahead. With an uncertain course, every branch splits its rate with the variance of the rate in the
+    /// middle of the step. Returns the spread of the rate for the split in the update.
     #[inline(always)]
     pub(crate) fn predict<V: Lanes<Number = T>>(&self, parts: &mut Parts<V, B>, course: Course<V>) -> RateSpread<V, S>
     where
@@ -98,7 +100,8 @@ impl<T: Scalar, S, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
         self.predict_as(parts, course)
     }
 
-    /// Predicts with a switch of the caller's, used by an uncertain course only: that of the filter may not work on these lanes.
+    /// Predicts with the caller's switch, because the filter's switch may not support these lanes. Only an uncertain course uses
+    /// it.
     #[inline(always)]
     pub(crate) fn predict_as<V: Lanes<Number = T>, X: Switch<V>>(
         &self,
@@ -115,7 +118,7 @@ impl<T: Scalar, S, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
         RateSpread::new(parts.rate_variance)
     }
 
-    /// Moves strain and rate, with their means and covariances, and returns the drive of the branches meanwhile.
+    /// Propagates means and covariances of strain and rate, and returns the drive of the branches.
     #[inline(always)]
     pub(super) fn drive<V: Lanes<Number = T>, X: Switch<V>>(
         &self,
@@ -153,7 +156,8 @@ impl<T: Scalar, S, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
                 Course::Within(phase, turning) => within(branch, gains.of(i), unit, (phase, &turning)),
             };
         }
-        // All branches are driven by about the same rate: what its direction leaves open is taken from the first.
+        // All branches are driven by about the same rate, so the variance due to its uncertain direction is taken from
+        // the first.
         let mut unexplained = if B > 0 { drives[0].left } else { zero };
         let opens = zero.less(unexplained);
         if matches!(course, Course::Uncertain) && !V::none(opens) {
@@ -165,7 +169,8 @@ impl<T: Scalar, S, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
         Driving { drives, unexplained }
     }
 
-    /// Moves the branches and the baseline, after the motion, whose covariances were the last; what it did to the branches.
+    /// Propagates the branches and the baseline after the motion, given its old covariances. Returns the effect on the
+    /// branches.
     #[inline(always)]
     pub(super) fn spread_on<V: Lanes<Number = T>>(
         &self,
@@ -205,7 +210,7 @@ impl<T: Scalar, S, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
         driven
     }
 
-    /// Predicts one step of a hold: strain stays, there is no rate, branches and baseline relax.
+    /// Predicts one step of a hold: strain is constant, the rate is zero, branches and baseline relax.
     #[inline(always)]
     fn hold<V: Lanes<Number = T>>(&self, parts: &mut Parts<V, B>) {
         let zero = parts.strain.nothing();
@@ -234,7 +239,7 @@ fn relax<V: Lanes, const B: usize>(part: &mut Part<V, B>, decay: V::Number, deca
     }
 }
 
-/// See [`ohmstrain_model::correlated_steps`]; a rate that is known has nothing to persist.
+/// See [`ohmstrain_model::correlated_steps`]; an exactly known rate has no error that persists.
 #[inline(always)]
 fn correlated_steps<V: Lanes>(ahead: V, together: V, fresh: V) -> V {
     let (square, both) = (ahead * ahead, together * together);
@@ -243,7 +248,7 @@ fn correlated_steps<V: Lanes>(ahead: V, together: V, fresh: V) -> V {
     (square + both).over(V::pick(least.less(left), left, least))
 }
 
-/// Returns the drive of a branch with a gain in a direction that is known.
+/// Returns the drive of a branch with the gain of a known direction.
 #[inline(always)]
 fn driven_by<V: Lanes>(gain: Gain<V>, strain_sum: V, unit: V) -> Drive<V> {
     let (here, zero) = (gain.at(strain_sum), unit.nothing());
@@ -257,7 +262,7 @@ fn known<V: Lanes, const B: usize>(gains: GainsAt<'_, V, B>, unit: V, phase: Pha
     driven_by(gain, gains.strain_sum, unit)
 }
 
-/// Returns the drive of a branch if the rate may have turned around on the way.
+/// Returns the drive of a branch if the rate may have turned around within the step.
 #[inline(always)]
 fn within<V: Lanes, const B: usize>(
     branch: &BranchConstants<V::Number, B>,
@@ -282,7 +287,7 @@ fn within<V: Lanes, const B: usize>(
     }
 }
 
-/// Returns the drive of a branch if the rate's distribution decides the direction.
+/// Returns the drive of a branch if the direction follows from the rate's distribution.
 #[inline(always)]
 fn split<V: Lanes, S: Switch<V>, const B: usize>(
     branch: &BranchConstants<V::Number, B>,
@@ -319,7 +324,7 @@ fn split<V: Lanes, S: Switch<V>, const B: usize>(
     }
 }
 
-/// Adds what the direction leaves open: one number for all branches.
+/// Adds the variance due to the uncertain direction, one number for all branches.
 #[inline(always)]
 fn leave_open<V: Lanes, const B: usize>(parts: &mut Parts<V, B>, driven: &[Driven<V>; B], unexplained: V) {
     for i in 0..B {
@@ -332,7 +337,7 @@ fn leave_open<V: Lanes, const B: usize>(parts: &mut Parts<V, B>, driven: &[Drive
     }
 }
 
-/// The branches' covariances with the new motion, which is in `parts` already, and with each other.
+/// Predicts the branches' covariances with the new motion, which is already in `parts`, and with each other.
 #[inline(always)]
 fn predict_branches<V: Lanes, const B: usize>(
     step: &StepConstants<V::Number, B>,
@@ -342,7 +347,7 @@ fn predict_branches<V: Lanes, const B: usize>(
 ) {
     for i in 0..B {
         let (branch, Driven { change, gain, pull, row, kept, carried, .. }) = (&step.branches[i], driven[i]);
-        // Without the new strain's share in the gain.
+        // Without the contribution of the new strain to the gain.
         let strain = sum(gain.scale(branch.cross_noise[0]), carried, a);
         let rate = sum(gain.scale(branch.cross_noise[1]), carried, b);
         let with_strain = pull.mul_add(parts.strain_variance, strain);
@@ -365,7 +370,7 @@ fn predict_branches<V: Lanes, const B: usize>(
     }
 }
 
-/// The baseline's covariances, from its own old ones.
+/// Predicts the baseline's covariances from its old ones.
 #[inline(always)]
 fn predict_baseline<V: Lanes, const B: usize>(
     step: &StepConstants<V::Number, B>,

@@ -8,13 +8,14 @@ use super::{Curve, Falls, Lanes, Part, Parts, SparseEkf, Switch};
 use crate::Gaussian;
 
 impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, B, N, G> {
-    /// Returns what the pull toward the mean strain and the mean rate of the phase on a `side` of zero, 1 or -1, add to the rate.
+    /// Returns the contribution to the rate of the pull toward the mean strain, and of the mean rate of the phase on a `side` of
+    /// zero, 1 or -1.
     #[inline(always)]
     fn push<V: Lanes<Number = T>>(&self, side: V) -> V {
         side.scale_add(self.step.phase_input[1], side.with(self.step.input[1]))
     }
 
-    /// The rate after a step in the moving phase on a `side` of zero.
+    /// Returns the rate after a step in the moving phase on a `side` of zero.
     #[inline(always)]
     pub(crate) fn rate_ahead<V: Lanes<Number = T>>(&self, side: V, from: &Parts<V, B>) -> Gaussian<V> {
         let step = &self.step;
@@ -22,7 +23,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         Gaussian { mean, variance }
     }
 
-    /// Lanes where next to no probability of a prediction is on its `side` of zero.
+    /// Lanes where almost none of a prediction's probability is on its `side` of zero.
     #[inline(always)]
     pub(crate) fn is_hopeless<V: Lanes<Number = T>>(&self, side: V, from: &Parts<V, B>) -> V::Mask {
         let ahead = self.rate_ahead(side, from);
@@ -42,8 +43,8 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         RateChange { expected: side * expected, spread, noise: side.with(step.noise[2]) }
     }
 
-    /// Returns the path that a rate on a `side` of zero leaves open over a step, in the lanes `wanted`. It is
-    /// [`SwitchedModel::turning`](ohmstrain_model::SwitchedModel::turning) of the model.
+    /// Returns the excess path over a step of a rate on a `side` of zero, in the lanes `wanted`. It computes the same
+    /// as [`SwitchedModel::turning`](ohmstrain_model::SwitchedModel::turning).
     #[inline(always)]
     pub(crate) fn turning<V: Falls<Number = T>, X: Switch<V>>(
         &self,
@@ -70,7 +71,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         let total = noise + even + spread;
         let change_sd = X::root(total);
         let thinner = one + side.literal(reach) * change_sd * per_sd;
-        // Half of an even change of unknown sign leads toward zero.
+        // Half of an even change of unknown sign is toward zero.
         let evenly = side.literal(even_excess) * (even + half * spread);
         let excess = density * (evenly + side.literal(brownian.0) * noise);
         let open = (side.literal(brownian.1) * density * total * change_sd).over(thinner);
@@ -78,16 +79,17 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
     }
 }
 
-/// Deviations of the rate beyond zero at which less than a thousandth of the prediction is left, too little to follow.
+/// Distance of the rate beyond zero, in standard deviations, at which a thousandth of the prediction's probability is
+/// left, too little to follow.
 const HOPELESS: f64 = 3.090_232_306_167_813_5;
 
-/// Returns the side of zero of a moving phase's rates, 1 or -1.
+/// Returns the side of zero, 1 or -1, of a moving phase's rates.
 #[inline(always)]
 pub(crate) fn side_of<V: Lanes>(phase: Phase, like: V) -> V {
     like.literal(if phase == Phase::Retract { -1.0 } else { 1.0 })
 }
 
-/// Adds the effect of motion by `by` from a belief to a mean and to a variance.
+/// Adds to a mean and a variance the effect of strain and rate of a belief, with factors `by`.
 #[inline(always)]
 fn answered<V: Lanes, const B: usize>(by: [V::Number; 2], (mean, variance): (V, V), from: &Parts<V, B>) -> (V, V) {
     let like = from.strain;
@@ -97,7 +99,7 @@ fn answered<V: Lanes, const B: usize>(by: [V::Number; 2], (mean, variance): (V, 
 }
 
 impl<T: Scalar> Gaussian<T> {
-    /// Returns the same Gaussian in all lanes, of which there are as many as here.
+    /// Returns the same Gaussian in all lanes.
     #[inline(always)]
     pub(crate) fn in_lanes<V: Lanes<Number = T>>(self, like: V) -> Gaussian<V> {
         Gaussian { mean: like.with(self.mean), variance: like.with(self.variance) }
@@ -117,8 +119,9 @@ impl<V: Lanes, const B: usize> Parts<V, B> {
         }
     }
 
-    /// Returns the probability of a `side` of zero for rates that are certain to be on it or not, or so far away that the tail beyond zero,
-    /// `clear` squared deviations off, is not cut off; and the lanes, among those `wanted`, where the tail is cut off.
+    /// Returns the probability of a `side` of zero for rates known exactly, or so far on that side, beyond `clear` in squared
+    /// standard deviations, that the tail is not truncated. Also returns the lanes, among those `wanted`, where the tail is
+    /// truncated.
     #[inline(always)]
     pub(crate) fn certain_of_side(&self, side: V, clear: V::Number, wanted: V::Mask) -> (V, V::Mask) {
         let variance = self.rate_variance;
@@ -134,8 +137,8 @@ impl<V: Lanes, const B: usize> Parts<V, B> {
 }
 
 impl<V: Falls, const B: usize> Parts<V, B> {
-    /// Restricts the rate to a `side` of zero where that is `wanted`; what it leaves of the Gaussian. Tails beyond `clear` squared
-    /// deviations are not cut off.
+    /// Truncates the rate to a `side` of zero in the lanes `wanted`, and returns the remaining probability. Tails beyond `clear`
+    /// in squared standard deviations are not truncated.
     #[inline(always)]
     pub(crate) fn cut_rate<X: Switch<V>, const N: usize>(&mut self, side: V, clear: V::Number, wanted: V::Mask) -> V {
         let (certain, cut) = self.certain_of_side(side, clear, wanted);
@@ -145,7 +148,7 @@ impl<V: Falls, const B: usize> Parts<V, B> {
         V::pick(cut, self.cut_off::<X, N>(side, cut), certain)
     }
 
-    /// Restricts the rate in the lanes that need a `cut`.
+    /// Truncates the rate in the lanes `cut`, and returns the remaining probability.
     #[inline(always)]
     pub(crate) fn cut_off<X: Switch<V>, const N: usize>(&mut self, side: V, cut: V::Mask) -> V {
         let (zero, gone) = (side.nothing(), side.literal(-1.0));
@@ -153,7 +156,7 @@ impl<V: Falls, const B: usize> Parts<V, B> {
         let border = -(side * self.rate) * per_sd;
         let Tail { mass, hazard: shift } = border.tail(cut);
         let narrowed = border * shift - shift * shift;
-        // By comparisons, which cost less than calls of `fmax` and `fmin`.
+        // Comparisons cost less than calls of `fmax` and `fmin`.
         let narrowed = V::pick(zero.less(narrowed), zero, V::pick(narrowed.less(gone), gone, narrowed));
         let (moves, narrows) = (side * (shift * per_sd), narrowed * per_sd * per_sd);
         self.regress::<N>(V::pick(cut, moves, zero), V::pick(cut, narrows, zero));
@@ -162,8 +165,8 @@ impl<V: Falls, const B: usize> Parts<V, B> {
 }
 
 impl<V: Lanes, const B: usize> Parts<V, B> {
-    /// Moves the rate, everything else along its regression: means by covariance · `moves`, covariances by the product of
-    /// both covariances · `narrows`.
+    /// Moves the rate, and everything else along its regression on the rate: means by covariance · `moves`, covariances
+    /// by the product of both covariances · `narrows`.
     #[inline(always)]
     pub(crate) fn regress<const N: usize>(&mut self, moves: V, narrows: V) {
         let (with_strain, with_rate) = (self.strain_rate, self.rate_variance);

@@ -1,30 +1,30 @@
-//! Lanes whose numbers are at hand one by one, for what vectors do not compute.
+//! Lanes with access to single numbers, for operations that vectors lack.
 
 use ohmstrain_model::Scalar;
 
 use super::falls::{Falling, INVERSE_FACTORIALS, INVERSE_FACTORIALS_F32};
 use super::{Lanes, Parts};
 
-/// The most lanes that there are.
+/// Maximum number of lanes.
 pub(crate) const MOST_LANES: usize = 8;
 
-/// A number, or a vector of numbers that can be looked at.
+/// A scalar, or a vector with access to its numbers.
 pub(crate) trait Several: Lanes {
-    /// The number in a lane.
+    /// Returns the number in a lane.
     fn at(&self, lane: usize) -> Self::Number;
-    /// Numbers made lane by lane.
+    /// Builds numbers lane by lane.
     fn build<const K: usize>(self, numbers: impl FnMut(usize) -> [Self::Number; K]) -> [Self; K];
-    /// The numbers with which a slice begins, zero where it has fewer than there are lanes.
+    /// Returns the first numbers of a slice, padded with zeros if it has fewer than there are lanes.
     #[must_use]
     fn first_of(self, numbers: &[Self::Number]) -> Self;
-    /// Writes the numbers to as many places as there are lanes.
+    /// Writes one number per lane to `places`.
     fn put_into(&self, places: &mut [Self::Number]);
-    /// The bits of the numbers shifted to the left; `shifted` does it with one of them.
+    /// Returns the bits of the numbers shifted to the left; `shifted` does so for a single number.
     #[must_use]
     fn bits_shifted(self, by: u32, shifted: impl FnOnce(Self::Number) -> Self::Number) -> Self;
     /// Returns the mask of the lanes for which `truth` holds.
     fn mask(self, truth: impl FnMut(usize) -> bool) -> Self::Mask;
-    /// The numbers in a lane.
+    /// Returns the numbers in a lane.
     fn parts<const B: usize, R>(
         parts: &Parts<Self, B>,
         lane: usize,
@@ -152,7 +152,7 @@ mod vector {
     }
 }
 
-/// Work that is done with numbers or with vectors of them.
+/// Work that can be done with scalars or with vectors.
 pub(crate) trait Work<T> {
     /// Result of the work.
     type Output;
@@ -161,14 +161,14 @@ pub(crate) trait Work<T> {
     fn with_lanes<V: Several<Number = T>>(self, like: V) -> Self::Output;
 }
 
-/// Numbers of which the processor may have vectors.
+/// Scalars for which the processor may have vectors.
 pub(crate) trait InVectors: Scalar {
-    /// Does work with vectors where the processor has some that are worth it. They round as numbers do: results are the same
-    /// to the last bit.
+    /// Does the work with vectors if the processor has suitable ones. They round like scalars: results are the same to the
+    /// last bit.
     fn in_vectors<W: Work<Self>>(work: W) -> Option<W::Output>;
     /// Constants of [`falling`](super::Falls::falling) in this precision.
     const FALLING: Falling<Self>;
-    /// The bits shifted to where an exponent stands.
+    /// Returns the number with its bits shifted into the exponent.
     #[must_use]
     fn to_exponent(self) -> Self;
 }
@@ -179,7 +179,7 @@ impl InVectors for f32 {
         None
     }
 
-    /// Taylor's series to r⁷ leaves r⁸/8! < 6e-9. e⁻⁸⁷ still is a normal number.
+    /// The Taylor series to r⁷ has an error of r⁸/8! < 6e-9. e⁻⁸⁷ is still a normal number.
     const FALLING: Falling<Self> = Falling {
         least: -87.0,
         rounds: 12_583_039.0,
@@ -195,7 +195,7 @@ impl InVectors for f32 {
 }
 
 impl InVectors for f64 {
-    /// Taylor's series to r¹³ leaves r¹⁴/14! < 5e-18. e⁻⁷⁰⁸ still is a normal number.
+    /// The Taylor series to r¹³ has an error of r¹⁴/14! < 5e-18. e⁻⁷⁰⁸ is still a normal number.
     const FALLING: Falling<Self> = Falling {
         least: -708.0,
         rounds: 6_755_399_441_056_767.0,

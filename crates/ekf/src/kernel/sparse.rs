@@ -1,15 +1,15 @@
-//! The EKF of the sensor's own model at a fixed rate, without a multiplication by zero.
+//! The EKF of the sensor's own model at a fixed rate, without multiplications by zero.
 //!
-//! Branches and baseline never touch each other in F, and a reading contains each of them with factor one. What depends on
-//! the step's length only is folded into constants beforehand. The variance of the rate after the step, which the choice of
-//! direction needs, is the one that the prediction computes anyway.
+//! Branches and baseline are not coupled in F, and a reading contains each of them with factor one. Terms that depend only
+//! on the step's length are precomputed. The variance of the rate after the step, needed for the direction, is a by-product
+//! of the prediction.
 //!
 //! # Policy
 //! As [`Ekf`](crate::Ekf), with two differences, both for microcontrollers: the belief is changed in place (an error leaves
-//! it as it was), and the covariance is updated as `P - (P Hᵀ)(P Hᵀ)ᵀ/S`, without Joseph's form. Where rounding makes a
-//! variance negative, the reading is more exact than the numbers: it is taken again with more and more noise until it leaves
-//! none. Only innovation, its variance and the NIS are returned; nothing takes a logarithm unless
-//! asked. Multiplications and additions are rounded one by one, in the order in which they are written.
+//! it unchanged), and the covariance is updated as `P - (P Hᵀ)(P Hᵀ)ᵀ/S`, without Joseph's form. If rounding makes a
+//! variance negative, the reading is too exact for the floating-point precision: it is taken again with increasing noise
+//! until no variance is negative. Only the innovation, its variance and the NIS are returned; logarithms are computed on
+//! request only. Multiplications and additions are rounded one by one, in the order in which they are written.
 
 use core::marker::PhantomData;
 
@@ -34,25 +34,25 @@ pub struct SparseEkf<T, S, const B: usize, const N: usize, G = AnyCurve<T>> {
 }
 
 impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, B, N, G> {
-    /// A filter for steps of `dt_s` seconds.
+    /// Creates a filter for steps of `dt_s` seconds.
     ///
     /// # Errors
-    /// If `dt_s` is not a positive number, or the model's gauge is of another family than `G`.
+    /// If `dt_s` is not a positive number, or the model's gauge is not of the family `G`.
     pub fn new(model: SwitchedModel<T, B, N>, dt_s: T) -> Result<Self, StepError> {
         check_step_length(dt_s)?;
         Self::of_any_length(model, dt_s)
     }
 
-    /// A filter whose own step has no length, and is an update without a prediction; steps are those that it
+    /// Creates a filter whose own step has zero length, an update without a prediction; use it with steps that it
     /// [prepares](crate::Estimator::prepare).
     ///
     /// # Errors
-    /// If the model's gauge is of another family than `G`.
+    /// If the model's gauge is not of the family `G`.
     pub fn at_a_moment(model: SwitchedModel<T, B, N>) -> Result<Self, StepError> {
         Self::of_any_length(model, T::zero())
     }
 
-    /// A filter for steps of `dt_s` seconds, or of no length.
+    /// Creates a filter for steps of `dt_s` seconds, or of zero length.
     pub(crate) fn of_any_length(model: SwitchedModel<T, B, N>, dt_s: T) -> Result<Self, StepError> {
         check_time_step(dt_s)?;
         Ok(Self {
@@ -75,10 +75,11 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         self.dt_s
     }
 
-    /// Changes the length of steps. The present length costs a comparison; another one costs as much as a new filter.
+    /// Changes the length of steps. The current length costs only a comparison; another one costs as much as a new
+    /// filter.
     ///
     /// # Errors
-    /// If `dt_s` is not a positive number; the filter stays as it was.
+    /// If `dt_s` is not a positive number; the filter is then unchanged.
     #[inline]
     pub fn retime(&mut self, dt_s: T) -> Result<(), StepError> {
         if dt_s == self.dt_s { Ok(()) } else { self.set_time_step(dt_s) }
@@ -92,16 +93,16 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         Ok(())
     }
 
-    /// Changes the length of steps without a check, for one that was checked, or is refused by its consequences.
+    /// Changes the length of steps without a check, for a length that was checked, or whose effects are rejected later.
     pub(crate) fn set_length(&mut self, dt_s: T) {
         self.step = StepConstants::new(&self.model, dt_s, RateSpread::<T, S>::clear());
         self.dt_s = dt_s;
     }
 
-    /// Predicts one step ahead and takes the reading; without one it is a prediction and returns `None`.
+    /// Predicts one step ahead and takes the reading. Without a reading it only predicts, and returns `None`.
     ///
     /// # Errors
-    /// See [`StepError`]; the belief is untouched.
+    /// See [`StepError`]; the belief is unchanged.
     #[inline]
     pub fn step<const L: usize>(
         &self,
@@ -114,14 +115,14 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         }
     }
 
-    /// Steps with a gate: a reading whose normalised innovation squared is above `gate` is compared, and not taken. The gate is applied
-    /// before the belief is written, so that a rejected reading costs no second step. χ² with one degree of freedom exceeds
+    /// Steps with a gate: a reading whose normalised innovation squared exceeds `gate` is compared but not taken. The gate is
+    /// applied before the belief is written, so that a rejected reading costs no second step. χ² with one degree of freedom exceeds
     /// 10.8 once in a thousand.
     ///
-    /// A gate without a way back can lock a filter out; [`Guard`](crate::Guard) has one.
+    /// A gate without readmission can lock a filter out; [`Guard`](crate::Guard) has readmission.
     ///
     /// # Errors
-    /// See [`StepError`]; the belief is untouched.
+    /// See [`StepError`]; the belief is unchanged.
     #[inline]
     pub fn step_gated<const L: usize>(
         &self,
@@ -135,7 +136,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         }
     }
 
-    /// Steps once, never inlined: beside a second try a compiler would compute in advance, and store, the part that both share.
+    /// Steps once. Never inlined: next to a second try, a compiler would compute and store their common part in advance.
     #[inline(never)]
     fn step_once<const L: usize>(
         &self,
@@ -183,7 +184,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         self.step_again(belief, Some(reading), refused, gated)?.ok_or(refused)
     }
 
-    /// A step that was `refused`, with more and more noise in its reading.
+    /// Repeats a `refused` step with increasing noise of the reading.
     #[cold]
     #[inline(never)]
     fn step_again<const L: usize>(
@@ -204,7 +205,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         }
     }
 
-    /// A refused reading with more noise; the refusal where noise is of no use.
+    /// Returns a refused reading with more noise, or the refusal if more noise does not help.
     #[cold]
     #[inline(never)]
     pub(crate) fn coarser(
@@ -220,10 +221,10 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
     }
 }
 
-/// The most tries of a step after the first.
+/// Maximum number of tries of a step after the first.
 pub(crate) const MOST_TRIES: u32 = 12;
 
-/// Refuses what is no length of a step that moves.
+/// Rejects a step length that is not a positive number.
 fn check_step_length<T: Scalar>(dt_s: T) -> Result<(), StepError> {
     check_time_step(dt_s)?;
     if dt_s.is_zero() { Err(StepError::NegativeTimeStep) } else { Ok(()) }

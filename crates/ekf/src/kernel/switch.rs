@@ -4,32 +4,32 @@ use super::Lanes;
 
 /// Split of an uncertain rate between stretching and releasing, for [`SparseEkf`](crate::SparseEkf).
 pub trait Switch<V: Lanes>: Copy {
-    /// A rate of at least that many standard deviations has one direction; nothing is computed for it.
+    /// Number of standard deviations from which a rate has a certain direction, and no split is computed.
     const CLEAR: f64;
 
-    /// Values that the splits of one step share.
+    /// Values shared by the splits of one step.
     type Width: Copy;
 
-    /// Prepares splits of rates with a variance above zero, 1/s².
+    /// Prepares splits of rates with a positive variance, 1/s².
     fn width(rate_variance: V) -> Self::Width;
 
-    /// Splits a rate that is not clear, 1/s.
+    /// Splits a rate, 1/s, whose direction is not certain.
     fn blend(rate: V, width: Self::Width) -> SplitRate<V>;
 
-    /// The square root that filters of hypotheses take of variances; as for [`CompactWidth::new`].
+    /// Returns the square root of a variance, for filters of hypotheses; see [`CompactWidth::new`].
     #[inline(always)]
     fn root(square: V) -> V {
         square.root()
     }
 }
 
-/// The logistic distribution, as the generic path has it ([`Direction::Uncertain`]): an exponential and a logarithm for
+/// The logistic distribution, as in the general model ([`Direction::Uncertain`]): an exponential and a logarithm for
 /// each split.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Logistic;
 
 impl<T: Scalar> Switch<T> for Logistic {
-    /// `exp(-1.702 · 22)` = 5e-17 is less than half of what `f64` adds to 1.
+    /// `exp(-1.702 · 22)` = 5e-17 is less than half the ε of `f64`.
     const CLEAR: f64 = 22.0;
 
     type Width = T;
@@ -43,14 +43,15 @@ impl<T: Scalar> Switch<T> for Logistic {
     }
 }
 
-/// A density that ends: `35/32 (1 - u²)³` at u deviations/3, which has the normal one's variance and kurtosis 2.45. Its
-/// integrals are polynomials, and from three deviations on there is nothing to compute.
+/// A density with bounded support: `35/32 (1 - u²)³` with u the number of standard deviations divided by 3. It has the
+/// variance of the normal density and a kurtosis of 2.45. Its integrals are polynomials, and beyond three standard
+/// deviations nothing needs to be computed.
 ///
-/// Its probability is off the normal one's by at most 0.0164, the logistic one's by 0.0095.
+/// Its probability differs from the normal one by at most 0.0164; the logistic one differs by 0.0095.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Compact;
 
-/// Half width of the density of [`Compact`], 1/s: three deviations.
+/// Half width of the density of [`Compact`], 1/s: three standard deviations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CompactWidth<V> {
     width: V,
@@ -59,7 +60,7 @@ pub struct CompactWidth<V> {
 }
 
 impl<V: Lanes> CompactWidth<V> {
-    /// Computes the width for a variance above zero, 1/s². Rust's core has no stable access to the square root of a microcontroller's
+    /// Computes the width for a positive variance, 1/s². Rust's core has no stable access to the square root of a microcontroller's
     /// floating-point unit: a [`Switch`] for such a target passes it as `root`.
     #[inline(always)]
     pub fn new(rate_variance: V, root: impl FnOnce(V) -> V) -> Self {
@@ -83,11 +84,12 @@ impl<V: Lanes> Switch<V> for Compact {
     #[inline(always)]
     fn blend(rate: V, CompactWidth { width, per_width, per_square }: CompactWidth<V>) -> SplitRate<V> {
         let half = rate.literal(0.5);
-        // Polynomials in u² do not wait for the root.
+        // Polynomials in u² do not depend on the square root.
         let u = rate * per_width;
         let w = rate * rate * per_square;
         let (minus_w, fourth) = (-w, w * w);
-        // 35/32 ∫ (1 - u²)³ du from 0, and its integral, which lets the whole of the rate be one direction's at u = 1.
+        // 35/32 ∫ (1 - u²)³ du from 0, and its integral, whose constant assigns the whole rate to one direction at u =
+        // 1.
         let lean = fourth.mul_add(linear(minus_w, 0.15625, 0.65625), linear(minus_w, 1.09375, 1.09375));
         let outer = fourth.mul_add(w.literal(0.01953125), linear(minus_w, 0.109375, 0.2734375));
         let spread = (-fourth).mul_add(outer, linear(w, 0.546875, 0.13671875));
@@ -117,7 +119,8 @@ fn unexplained<V: Lanes>(extends: V, retracts: V, variance: V) -> V {
     variance * variance.literal(UNEXPLAINED) * both * shape
 }
 
-/// The variance that all rates of a step share; its root is taken at most once, and only if some rate is not clear.
+/// The variance shared by all rates of a step; its root is taken at most once, and only if some rate's direction is not
+/// certain.
 pub(crate) struct RateSpread<V: Lanes, S: Switch<V>> {
     pub variance: V,
     width: Option<S::Width>,
@@ -138,13 +141,13 @@ impl<V: Lanes, S: Switch<V>> RateSpread<V, S> {
         Self { variance, width: None }
     }
 
-    /// `CLEAR²`: a rate is clear if its square is not less than this times the variance.
+    /// `CLEAR²`: a rate's direction is certain if its square is at least this times the variance.
     #[inline(always)]
     pub(crate) fn clear() -> V::Number {
         V::Number::of(S::CLEAR * S::CLEAR)
     }
 
-    /// Splits a rate that is not clear; means nothing in lanes where it is.
+    /// Splits a rate whose direction is not certain; meaningless in lanes where it is.
     #[inline(always)]
     pub(crate) fn blend(&mut self, rate: V) -> SplitRate<V> {
         let width = match self.width {

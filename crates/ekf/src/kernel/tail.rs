@@ -6,28 +6,30 @@ use ohmstrain_model::{Number, Scalar};
 use super::{Falls, InVectors, Lanes};
 use crate::Gaussian;
 
-/// `f32` or `f64`: what filters of hypotheses compute with.
+/// Number type of filters of hypotheses: `f32` or `f64`.
 #[allow(private_bounds, reason = "sealed: what a vector holds")]
 pub trait Real: Scalar + InVectors {}
 
 impl Real for f32 {}
 impl Real for f64 {}
 
-/// A [`Real`], or an expression that stands for one and writes down what is done with it (feature `record`): what is computed number by
-/// number, around the kernel.
+/// A [`Real`], or an expression that stands for one and records the operations on it (feature `record`); used by scalar
+/// computations around the kernel.
 #[allow(private_bounds, reason = "sealed: what there are exponentials for")]
 pub trait Recordable: Number + Falls {}
 
 impl<T: Real> Recordable for T {}
 
-/// Upper tail above a border: its probability, and the density at the border over it (the hazard, the inverse of Mills' ratio).
+/// Upper tail above a border: its probability, and the density at the border divided by it (the hazard, the inverse of Mills'
+/// ratio).
 pub(crate) struct Tail<T> {
     pub mass: T,
     pub hazard: T,
 }
 
 impl<V: Falls> Tail<V> {
-    /// Computes the tail of a standard normal above `border`, in the lanes `wanted`. The mass is off by up to about `border²` roundings.
+    /// Computes the tail of a standard normal above `border`, in the lanes `wanted`. The error of the mass is up to about `border²`
+    /// roundings.
     #[inline(always)]
     pub(crate) fn above(border: V, wanted: V::Mask) -> Self {
         let (half, one, zero) = (border.literal(0.5), border.literal(1.0), border.nothing());
@@ -46,7 +48,7 @@ impl<V: Falls> Tail<V> {
         let scaled = scaled(V::pick(below, -x, x), square);
         let beyond = half * falls * scaled;
         mass = V::pick(is_near, mass, V::pick(below, one - beyond, beyond));
-        // Far above, both density and mass vanish, and their ratio is that of what they are in units of the exponential.
+        // Far above, both density and mass underflow; their ratio is taken without the common exponential.
         let by_mass = V::either(is_near, below);
         let (above, under) =
             (V::pick(by_mass, density, border.literal(ROOT_TWO_PER_PI)), V::pick(by_mass, mass, scaled));
@@ -54,14 +56,14 @@ impl<V: Falls> Tail<V> {
     }
 }
 
-/// Probability of a standard normal above `x`.
+/// Returns the probability of a standard normal above `x`.
 #[inline]
 fn upper_tail<T: Real>(x: T) -> T {
     Tail::above(x, true).mass
 }
 
 impl<T: Real> Gaussian<T> {
-    /// Probability of a value above `x`.
+    /// Returns the probability of a value above `x`.
     #[must_use]
     pub fn probability_above(&self, x: T) -> T {
         if self.variance <= T::zero() {
@@ -74,13 +76,13 @@ impl<T: Real> Gaussian<T> {
 const PER_ROOT_TWO_PI: f64 = 0.398_942_280_401_432_7;
 const ROOT_TWO_PER_PI: f64 = 0.797_884_560_802_865_4;
 
-// The rational approximations below are those of W. J. Cody, *Math. Comp.* 23 (1969) 631, in the coefficients of his CALERF
-// (1990): each is off by less than a rounding of a double.
+// The rational approximations below are those of W. J. Cody, *Math. Comp.* 23 (1969) 631, with the coefficients of his
+// CALERF (1990). The error of each is below one rounding of a double.
 
-/// Square of the argument below which erf is taken: 0.46875².
+/// Square of the argument below which erf is used: 0.46875².
 const NEAR: f64 = 0.219_726_562_5;
 
-/// `erf(x)/x`, for small squares.
+/// Returns `erf(x)/x` for small squares.
 #[inline(always)]
 fn near<V: Lanes>(square: V) -> V {
     let c = <V::Number as Scalar>::of;
@@ -101,7 +103,7 @@ fn near<V: Lanes>(square: V) -> V {
     polynomial(above, square).over(polynomial(below, square))
 }
 
-/// `exp(x²) erfc(x)` from 0.46875 on.
+/// Returns `exp(x²) erfc(x)` for x from 0.46875.
 #[inline(always)]
 fn scaled<V: Lanes>(x: V, square: V) -> V {
     let is_far = x.literal(4.0).less(x);
@@ -135,7 +137,7 @@ fn scaled<V: Lanes>(x: V, square: V) -> V {
     if V::none(is_far) { middle } else { V::pick(is_far, far(x, square), middle) }
 }
 
-/// Returns `exp(x²) erfc(x)` beyond 4.
+/// Returns `exp(x²) erfc(x)` for x beyond 4.
 #[inline(always)]
 fn far<V: Lanes>(x: V, square: V) -> V {
     let c = <V::Number as Scalar>::of;
@@ -160,8 +162,8 @@ fn far<V: Lanes>(x: V, square: V) -> V {
     (x.literal(core::f64::consts::FRAC_2_SQRT_PI) * x.literal(0.5) - less).over(x)
 }
 
-/// Evaluates a polynomial by Horner's scheme, the coefficient of the highest power first. The coefficients are of the lanes' own type,
-/// which a microcontroller without double precision need not convert.
+/// Evaluates a polynomial by Horner's scheme, the coefficient of the highest power first. The coefficients have the lanes' number
+/// type, so that a microcontroller without double precision need not convert them.
 #[inline(always)]
 fn polynomial<V: Lanes, const N: usize>(coefficients: [V::Number; N], x: V) -> V {
     let mut sum = x.with(coefficients[0]);
@@ -175,8 +177,8 @@ fn polynomial<V: Lanes, const N: usize>(coefficients: [V::Number; N], x: V) -> V
 mod tests {
     use super::{Tail, upper_tail};
 
-    /// Against another implementation of erfc, and the definition of the hazard. An argument of `z²/2` is rounded twice on its
-    /// way into the exponential, and the polynomials take some ten roundings more.
+    /// Compares with another implementation of erfc, and with the definition of the hazard. The argument `z²/2` of the
+    /// exponential is rounded twice, and the polynomials add about ten roundings.
     #[test]
     fn a_tail_is_that_of_erfc() {
         for k in -900..=3700 {

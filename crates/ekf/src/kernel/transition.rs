@@ -1,4 +1,4 @@
-//! A step as matrices, for smoothers: of the kernel that ran forward.
+//! Matrices of a step for smoothers, from the same kernel as the forward step.
 
 use nalgebra::SMatrix;
 use ohmstrain_model::{Scalar, Transition};
@@ -8,13 +8,14 @@ use super::{Course, Parts, SparseEkf, Switch};
 use crate::Belief;
 
 impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
-    /// F and Q of a step with an uncertain direction, and where it leads: what [`rts_step`](crate::rts_step) goes back by.
+    /// Returns F and Q of a step with an uncertain direction, and the prior after it, as needed by
+    /// [`rts_step`](crate::rts_step).
     pub(crate) fn transition<const L: usize>(&self, from: &Belief<T, N, L>) -> (Transition<T, N, L>, Belief<T, N, L>) {
         let mut parts = Parts::of(from);
         let Parts { strain_variance, strain_rate, rate_variance, .. } = parts;
         let driving = self.drive::<T, S>(&mut parts, Course::Uncertain);
         let driven = self.spread_on(&mut parts, &driving, [strain_variance, strain_rate, rate_variance]);
-        // The same from a state that is known is the noise alone.
+        // The same step from an exactly known state gives the noise alone.
         let [strain_variance, strain_rate, rate_variance] = self.step.noise;
         let mut noise = Parts { strain_variance, strain_rate, rate_variance, ..Parts::certain(T::zero()) };
         self.spread_on(&mut noise, &driving, [T::zero(); 3]);

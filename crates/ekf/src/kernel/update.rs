@@ -7,7 +7,7 @@ use super::predict::{dot, sum};
 use super::{Curve, Lanes, Part, Parts, RateSpread, Several, SparseEkf, Switch};
 use crate::{Reading, Residual, StepError};
 
-/// A reading beside its prediction.
+/// A reading compared with its prediction.
 #[derive(Clone, Copy)]
 pub(crate) struct Compared<V, const B: usize> {
     /// Covariances of the state with the reading.
@@ -29,13 +29,13 @@ pub(crate) struct ReadingLaw<T, G> {
     pub variance: T,
 }
 
-/// The reading that motion alone makes expect.
+/// Expected reading due to motion alone.
 struct OfMotion<V> {
     expected: V,
-    /// Its derivatives by strain and rate.
+    /// Derivatives with respect to strain and rate.
     slope: V,
     viscosity: V,
-    /// Variance of what lines leave of the gauge, and an uncertain direction of the dash-pot.
+    /// Variance due to the gauge's linearisation, and to an uncertain direction of the dash-pot.
     open: V,
 }
 
@@ -91,7 +91,7 @@ impl<T: Scalar, G: Curve<T>> ReadingLaw<T, G> {
 }
 
 impl<V: Lanes, const B: usize> Compared<V, B> {
-    /// Normalised innovation squared.
+    /// Returns the normalised innovation squared.
     #[inline(always)]
     pub(crate) fn nis(&self) -> V {
         self.innovation * (self.innovation * self.variance.recip())
@@ -107,9 +107,9 @@ impl<V: Lanes> OfMotion<V> {
 }
 
 impl<T: Scalar, S, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, B, N, G> {
-    /// Takes a reading, unless there is a `gate` and its NIS is beyond. `phase` is a hypothesis, as for
-    /// [`Channel::observe`](crate::Channel::observe); with `None` the rate is split by its variance, which is in `spread`. After
-    /// an error `parts` means nothing.
+    /// Takes a reading, unless there is a `gate` and its NIS exceeds it. `phase` is a hypothesis, as for
+    /// [`Channel::observe`](crate::Channel::observe); with `None` the rate is split using its variance in `spread`. After an
+    /// error `parts` is meaningless.
     #[inline(always)]
     pub(crate) fn update(
         &self,
@@ -129,8 +129,8 @@ impl<T: Scalar, S, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, 
             Self::correct(parts, &compared, true);
         }
         let residual = Residual { innovation, variance, nis };
-        // S and ν²/S finite, S above zero: then everything before was finite. No variance below zero: then no gain can have
-        // left the range of the numbers (Cauchy-Schwarz), and the means are all that is left to look at.
+        // If S and ν²/S are finite and S is positive, everything before was finite. If no variance is negative, no gain can
+        // have overflowed (Cauchy-Schwarz). Only the means remain to be checked.
         if variance > T::zero() && !(reading.extra_variance < T::zero()) && parts.is_sound::<N>(variance + nis) {
             Ok(residual)
         } else {
@@ -138,7 +138,7 @@ impl<T: Scalar, S, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, 
         }
     }
 
-    /// Takes readings where they are `present`; how they compared, and where what is left is sound.
+    /// Takes readings in the lanes `present`. Returns the comparison, and the lanes with a valid result.
     #[inline(always)]
     pub(crate) fn update_where<V: Several<Number = T>, X: Switch<V>>(
         &self,
@@ -151,8 +151,8 @@ impl<T: Scalar, S, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, 
         let compared = self.compare(parts, reading, phase, spread);
         let nis = Self::correct(parts, &compared, present);
         let Compared { innovation, variance, .. } = compared;
-        // S and ν²/S finite, S above zero: then everything before was finite. No variance below zero: then no gain can have
-        // left the range of the numbers (Cauchy-Schwarz), and the means are all that is left to look at.
+        // If S and ν²/S are finite and S is positive, everything before was finite. If no variance is negative, no gain can
+        // have overflowed (Cauchy-Schwarz). Only the means remain to be checked.
         let mut sound = V::both(variance.nothing().less(variance), reading.extra_variance.not_negative());
         if !V::none(sound) {
             sound = V::both(sound, parts.is_sound::<N>(variance + nis));
@@ -217,7 +217,7 @@ impl<T: Scalar, S, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, 
         Compared { strain, rate, branches, baseline, variance, innovation }
     }
 
-    /// Takes the readings where they are `present`; their NIS.
+    /// Takes the readings in the lanes `present`, and returns their NIS.
     #[inline(always)]
     pub(crate) fn correct<V: Lanes<Number = T>>(
         parts: &mut Parts<V, B>,

@@ -1,32 +1,32 @@
-//! Doubts that make an interval wider than the filter's own, in any precision.
+//! Doubts that widen a filter's own interval, in any precision.
 
 use super::{Flag, Flags, Innovations, NEVER_READ_S, RestSeen, RestWatch, SURPRISING_NIS, TurnSeen, TurnWatch, Unread};
 use crate::{Gaussian, Recordable};
 
-/// The numbers behind the widened intervals, also for programs that write a filter in another language.
+/// Constants of the widened intervals, also for programs that generate a filter in another language.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DoubtNumbers {
-    /// Time constant, s, with which readings beyond those of the largest strains are forgotten: a body reaches such strains from time to
-    /// time. A third of it applies to readings beyond the side of rest, and to the mean of normalised innovations squared; a twelfth
-    /// to the doubt of a start or a fault.
+    /// Time constant, s, with which the doubt due to readings beyond those of the largest strains decays; a body reaches such
+    /// strains from time to time. A third of it applies to readings beyond the side of rest, and to the mean of normalised
+    /// innovations squared; a twelfth to the doubt due to a start or a fault.
     pub far_fades_s: f64,
-    /// Factor on the distance of readings outside the calibrated range on the side of rest. A sensor that has not moved for long starts
-    /// there and soon leaves it.
+    /// Factor on the distance of readings outside the calibrated range on the side of rest. A sensor that has not moved for a long
+    /// time starts there and soon leaves it.
     pub near_counts: f64,
-    /// Factor on the distance of readings outside on the other side, reached only with another R₀, another gain or a strain beyond
-    /// calibration's: if all readings are off, only those at an end of their range show it, and not all of it.
+    /// Factor on the distance of readings outside on the other side. Only a changed R₀, a changed gain or a strain beyond the
+    /// calibration leads there. If all readings are off, only those at an end of their range show it, and only in part.
     pub far_counts: f64,
-    /// Tolerance of readings outside the calibrated range, as a share of it.
+    /// Tolerance of readings outside the calibrated range, as a fraction of it.
     pub margin: f64,
-    /// Factor on the fastest rate of calibration, its 99th percentile, above which a rate is flagged.
+    /// Factor on the fastest rate of calibration, its 99th percentile, beyond which a rate is flagged.
     pub faster: f64,
-    /// Share of the filter's variance, or of the doubt at a start, from which on a doubt is worth a flag.
+    /// Fraction of the filter's variance, or of the doubt at a start, beyond which a doubt raises a flag.
     pub worth: f64,
     /// Tolerance around zero strain, as a fraction of the span.
     pub zero: f64,
 }
 
-/// The numbers behind the widened intervals.
+/// Constants of the widened intervals.
 pub const DOUBT: DoubtNumbers = DoubtNumbers {
     far_fades_s: 60.0,
     near_counts: 0.5,
@@ -37,7 +37,7 @@ pub const DOUBT: DoubtNumbers = DoubtNumbers {
     zero: 0.01,
 };
 
-/// Calibration values that the doubts of a sensor depend on.
+/// Calibration values on which the doubts of a sensor depend.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct DoubtParts<T> {
@@ -49,16 +49,16 @@ pub struct DoubtParts<T> {
     pub fastest_per_s: T,
     /// Longest recording, s.
     pub longest_s: T,
-    /// Range of the strain over that of the readings.
+    /// Range of the strain divided by that of the readings: the mean slope.
     pub per_reading: T,
     /// Variance of the strain at an unknown start.
     pub start: T,
-    /// Variance of a strain that may be anywhere in the limits, or what is not stated if that is more: there is no more to doubt.
+    /// Largest variance of doubts: that of a strain anywhere in the limits, or `unstated` if larger.
     pub most: T,
-    /// Variance of the strain that the filter does not state: from what a session leaves open of R₀, and from errors on rows that the
-    /// calibration was not fitted to.
+    /// Variance of the strain beyond the stated one: from the uncertainty of a session's R₀, and from errors on held-out rows of
+    /// the calibration.
     pub unstated: T,
-    /// Bounds on the strain without a reading.
+    /// Bounds on the strain while there is no reading.
     pub unread: Unread<T>,
     /// Readings of the sensor at rest in calibration, if known.
     pub rest: Option<RestSeen<T>>,
@@ -90,9 +90,9 @@ impl DoubtParts<f64> {
 struct Left<T> {
     /// 60 s.
     far: T,
-    /// 20 s: that readings were outside of calibration's on the side of rest, or off what was predicted.
+    /// 20 s: readings beyond the calibrated ones on the side of rest, or off their predictions.
     lately: T,
-    /// 5 s: that a filter has just begun, or begun again.
+    /// 5 s: a filter that has just started, or restarted.
     soon: T,
 }
 
@@ -109,7 +109,8 @@ impl<T: Recordable> Left<T> {
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Misfit<T> {
-    /// Distance of readings outside the calibrated range on the side of rest, and on the other side, R/R₀ - 1; it decays with time.
+    /// Distances of readings outside the calibrated range, on the side of rest and on the other side, R/R₀ - 1; they decay with
+    /// time.
     pub(crate) near: T,
     pub(crate) far: T,
     pub(crate) innovations: Innovations<T>,
@@ -131,7 +132,7 @@ impl<T: Recordable> Misfit<T> {
         self.innovations.see(left.lately, nis);
     }
 
-    /// The strain's variance for readings outside of calibration's.
+    /// Returns the variance of the strain for readings outside the calibrated range.
     fn outside(&self, parts: &DoubtParts<T>) -> T {
         let per_reading = parts.per_reading;
         let (near, far) =
@@ -140,8 +141,8 @@ impl<T: Recordable> Misfit<T> {
     }
 }
 
-/// Doubts that a filter does not have by itself: that it has just started, or restarted; that readings have jumped; that the sensor is
-/// used outside its calibrated range, or that its law does not fit. They widen the strain's interval and raise flags with the reason.
+/// Uncertainty that a filter does not state by itself: after a start or restart, after a jump of the readings, outside the
+/// calibrated range, or if the law does not fit. Doubts widen the strain's interval, and raise flags with the reason.
 ///
 /// ```
 /// use ohmstrain_ekf::Gaussian;
@@ -176,19 +177,19 @@ pub struct Doubts<T> {
     pub(crate) starts: bool,
     /// Time since the first row, s.
     pub(crate) run_s: T,
-    /// Variance of the strain that fades while readings are believed.
+    /// Variance of the strain that decays while readings do not surprise.
     pub(crate) fading: T,
-    /// Time since the last reading that was used, s, and whether one has been refused since.
+    /// Time since the last used reading, s; `refused` is true if a reading has been rejected since.
     pub(crate) unread_s: T,
     pub(crate) refused: bool,
-    /// The last reading that was believed, R/R₀ - 1.
+    /// The last reading that did not surprise, R/R₀ - 1.
     pub(crate) believed: Option<T>,
     pub(crate) misfit: Misfit<T>,
     /// True if the strain's variance already includes innovations that are larger than stated.
     corrected: bool,
-    /// Watch for another R₀ than calibration's; `None` if calibration does not know the rested sensor's reading.
+    /// Watch for an R₀ that differs from the calibrated one; `None` if the calibration has no reading at rest.
     pub(crate) rest: Option<RestWatch<T>>,
-    /// Watch for holds that are longer than calibration's; `None` if calibration does not know how long they were.
+    /// Watch for holds longer than those of the calibration; `None` if the calibration lacks their duration.
     pub(crate) turns: Option<TurnWatch<T>>,
 }
 
@@ -212,41 +213,42 @@ impl<T: Recordable> Doubts<T> {
         }
     }
 
-    /// The watch for holds that are longer than calibration's; `None` if calibration does not know how long they were.
+    /// Returns the watch for holds longer than those of the calibration; `None` if the calibration lacks their
+    /// duration.
     pub const fn turns(&self) -> Option<&TurnWatch<T>> {
         self.turns.as_ref()
     }
 
-    /// States that the strain is known at the start; `rests` if it is zero.
+    /// Marks the strain as known at the start; `rests` if it is zero.
     #[must_use]
     pub fn of_known_strain(self, rests: bool) -> Self {
         let rest = self.parts.rest.map(|seen| RestWatch::new(seen, rests));
         Self { starts: false, fading: T::zero(), unread_s: T::zero(), rest, ..self }
     }
 
-    /// States that the filter's correction includes the size of innovations.
+    /// Marks the filter's correction as including the size of innovations.
     #[must_use]
     pub fn of_corrected(self) -> Self {
         Self { corrected: true, ..self }
     }
 
-    /// Returns the factor by which innovations have been larger than stated, for the correction of the next row.
+    /// Returns the ratio of observed to stated innovation variance, at least 1, for the correction of the next row.
     pub fn birge(&self) -> T {
         self.misfit.innovations.birge()
     }
 
-    /// The strain is known now: what was doubted of it is gone.
+    /// Clears the doubts about the strain, which is now known.
     pub fn settle(&mut self) {
         (self.fading, self.starts, self.unread_s, self.refused) = (T::zero(), false, T::zero(), false);
         self.turns.iter_mut().for_each(TurnWatch::settle);
     }
 
-    /// Restarts the watch: R₀ of the day is now given.
+    /// Restarts the watch, because the R₀ of the session is now given.
     pub fn restart_rest_watch(&mut self) {
         self.rest.iter_mut().for_each(RestWatch::restart);
     }
 
-    /// Raises the fading variance if this doubt exceeds what is left of a start.
+    /// Raises the fading variance to `variance`, at most [`DoubtParts::most`], if that is larger.
     fn raise(&mut self, variance: T) {
         let variance = variance.min(self.parts.most);
         if variance > self.fading {
@@ -263,7 +265,7 @@ impl<T: Recordable> Doubts<T> {
     }
 
     /// Takes a row: a reading that was used, R/R₀ - 1, with its normalised innovation squared, or none. Returns the variance of the
-    /// strain: the stated one, or what the pause of the readings leaves open.
+    /// strain: the stated one, or that after the pause of the readings.
     pub fn see(&mut self, dt_s: T, reading: Option<(T, T)>, stated: Gaussian<T>) -> T {
         self.pass(dt_s);
         let Some((rho, nis)) = reading else { return self.open(stated) };
@@ -272,7 +274,7 @@ impl<T: Recordable> Doubts<T> {
         stated.variance
     }
 
-    /// True once a reading was used or the strain was known.
+    /// True once a reading has been used or the strain has been known.
     pub fn has_begun(&self) -> bool {
         self.unread_s < T::of(NEVER_READ_S)
     }
@@ -282,7 +284,7 @@ impl<T: Recordable> Doubts<T> {
         self.runs
     }
 
-    /// Takes the time of a row, `dt_s` seconds after the one before.
+    /// Advances to a row `dt_s` seconds after the previous one.
     pub fn pass(&mut self, dt_s: T) {
         let passed_s = if self.runs { dt_s } else { T::zero() };
         self.runs = true;
@@ -290,12 +292,12 @@ impl<T: Recordable> Doubts<T> {
         self.unread_s += passed_s;
     }
 
-    /// A reading has been refused: what it was a fault of may be over with the next one that is used, or not.
+    /// Notes a rejected reading; its fault may or may not be over when the next reading is used.
     pub fn refuse(&mut self) {
         self.refused = true;
     }
 
-    /// Variance of the strain that the time since the last reading leaves open.
+    /// Returns the variance of the strain after the time since the last reading.
     #[must_use]
     pub fn open(&self, stated: Gaussian<T>) -> T {
         self.parts.unread.variance(self.unread_s, stated.mean, stated.variance)
@@ -309,10 +311,11 @@ impl<T: Recordable> Doubts<T> {
         });
     }
 
-    /// Takes a reading that was used. All that counts is the time since the reading before it, in however many rows.
+    /// Takes a reading that was used. Only the time since the previous reading counts, in any number of rows.
     ///
-    /// After a pause of t seconds the deviation of a start, times (1 - exp(-t/5 s))², is doubted: nothing after a reading that was
-    /// lost, all of it after half a minute. After readings that were turned down or stood still it is as far as a body can have moved meanwhile.
+    /// After a pause of t seconds, the doubt is the standard deviation at a start times (1 - exp(-t/5 s))²: none after a single
+    /// lost reading, all of it after half a minute. After rejected or stuck readings, it is the distance that a body can have moved
+    /// in the meantime.
     pub fn read(&mut self, rho: T, nis: T) {
         let passed_s = if self.has_begun() { self.unread_s } else { T::zero() };
         self.unread_s = T::zero();
@@ -336,8 +339,9 @@ impl<T: Recordable> Doubts<T> {
         self.judge(&left, passed_s, rho, nis);
     }
 
-    /// Takes a row on a smoother's way back, which knows no start and nothing that fades: `run_s` after the first row, `dt_s`
-    /// before the reading that comes next; `unturned_s` from the turn of the readings before it to the one after it.
+    /// Takes a row in a smoother's backward pass, which has no doubts due to a start or a fault. The row is `run_s` after the
+    /// first row and `dt_s` before the next reading; `unturned_s` is the time between the turns of the readings before and
+    /// after it.
     pub fn see_back(&mut self, run_s: T, dt_s: T, unturned_s: T, reading: Option<(T, T)>) {
         (self.run_s, self.starts, self.fading) = (run_s, false, T::zero());
         self.turns.iter_mut().for_each(|turns| turns.lasts(unturned_s));
@@ -346,7 +350,7 @@ impl<T: Recordable> Doubts<T> {
         }
     }
 
-    /// Updates the doubts of the law and of R₀ with a reading.
+    /// Updates the doubts about the law and R₀ with a reading.
     fn judge(&mut self, left: &Left<T>, passed_s: T, rho: T, nis: T) {
         self.misfit.see(&self.parts, left, rho, nis);
         self.rest.iter_mut().for_each(|rest| {
@@ -355,10 +359,11 @@ impl<T: Recordable> Doubts<T> {
     }
 
     /// Returns the variance of a stated strain with all doubts, and their flags. Readings outside the calibrated range widen it by a
-    /// multiple of their distance times the mean slope. Readings that have not turned for longer than in calibration leave nothing but the
-    /// limits of the strain in the end, or a doubt between the strain and rest if they are those of rest. Innovations that are larger than stated widen the interval as they would a weighted
-    /// mean's (Birge, *Phys. Rev.* 40 (1932) 207), unless a correction has counted them. So does a rate beyond calibration's. The variance
-    /// stays below that without readings.
+    /// multiple of their distance times the mean slope. If readings have not turned for longer than in calibration, the variance
+    /// grows to that of a strain anywhere in the limits, or to the squared strain if they are readings at rest. Innovations larger
+    /// than stated widen the interval as in a weighted mean (Birge, *Phys. Rev.* 40 (1932) 207), unless a correction already
+    /// includes them. A rate beyond the calibrated one also widens it. The multiplied variance and the sum of the other doubts are
+    /// each limited to [`DoubtParts::most`].
     pub fn widened(&self, strain: Gaussian<T>, rate: T) -> (T, Flags) {
         let Gaussian { mean, variance } = strain;
         let (worth, most, per_reading) = (T::of(DOUBT.worth), self.parts.most, self.parts.per_reading);
@@ -385,7 +390,7 @@ impl<T: Recordable> Doubts<T> {
         (stated + more, flags)
     }
 
-    /// The variance that a variance of the strain is, of a reading R/R₀ - 1 on the mean slope of calibration.
+    /// Converts a variance of the strain to one of a reading R/R₀ - 1, with the mean slope of the calibration.
     pub fn of_reading(&self, variance: T) -> T {
         variance / (self.parts.per_reading * self.parts.per_reading)
     }
@@ -423,7 +428,7 @@ mod tests {
         }
     }
 
-    /// Returns the variance and flags after rows every 0.1 s, of readings with normalised innovations squared.
+    /// Returns the variance and flags after rows every 0.1 s of readings with normalised innovations squared.
     fn said(parts: DoubtParts<f64>, rows: impl IntoIterator<Item = (f64, f64)>) -> (f64, Flags) {
         let mut doubts = Doubts::new(parts).of_known_strain(false);
         rows.into_iter().for_each(|row| {
@@ -434,30 +439,30 @@ mod tests {
 
     #[test]
     fn innovations_that_are_larger_than_stated_widen_as_much() {
-        // After 200 s all but exp(-10) of the mean is there.
+        // After 200 s the mean has settled to exp(-10).
         for (nis, times) in [(0.5, 1.0), (1.0, 1.0), (4.0, 4.0), (1e6, 30.0)] {
-            // No jump: all of them say the same.
+            // No jump: all readings are equal.
             let (variance, flags) = said(parts(1.0), vec![(0.5, nis); 2000]);
             assert!((variance / STATED.variance / times - 1.0).abs() < 1e-3, "{nis}: {variance}");
             assert_eq!(flags.has(Flag::Extrapolated), times > 1.0);
         }
-        // The correction has their features, too.
+        // With a correction, innovations do not widen the interval again.
         let mut doubts = Doubts::new(parts(1.0)).of_known_strain(false).of_corrected();
         (0..2000).for_each(|_| {
             doubts.see(0.1, Some((0.5, 4.0)), STATED);
         });
         let (variance, flags) = doubts.widened(STATED, 0.0);
-        // Rows that are 0.1 s apart are pauses of 0.1 s.
+        // Rows 0.1 s apart are pauses of 0.1 s.
         let stated = STATED.variance + 1e-4 * (1.0 - (-0.1_f64 / 5.0).exp()).powi(4);
         assert!((doubts.birge() - 4.0).abs() < 1e-3 && (variance - stated).abs() < 1e-12, "{variance}");
         assert!(flags.has(Flag::Extrapolated));
-        // One outlier among those that fit: 30 of it for a two-hundredth of the time.
+        // One outlier among readings that fit: capped at 30, for a two-hundredth of the time.
         let outlier = |k: usize| (0.5, if k == 1990 { 1e6 } else { 0.5 });
         let (variance, flags) = said(parts(1.0), (0..2000).map(outlier));
         assert!((variance - stated).abs() < 1e-12 && flags == Flags::NONE, "{variance} {flags}");
     }
 
-    /// Readings that turned every 10 s stand still for 13.5 s: half of the way from 12 to 15 s, whether they are those of rest or not.
+    /// Readings that turned every 10 s stand still for 13.5 s: halfway from 12 to 15 s, whether they are readings at rest or not.
     #[test]
     fn holds_longer_than_those_of_calibration_leave_the_limits_or_rest() {
         let still = |rests: bool, of_limits: bool| {
@@ -472,7 +477,7 @@ mod tests {
             };
             let (variance, flags) = said(parts, rows);
             assert!(flags.has(Flag::Extrapolated));
-            // Rows that are 0.1 s apart are pauses of 0.1 s.
+            // Rows 0.1 s apart are pauses of 0.1 s.
             variance - STATED.variance - 1e-4 * (1.0 - (-0.1_f64 / 5.0).exp()).powi(4)
         };
         assert!((still(false, true) - 0.0075 / 4.0).abs() < 1e-9);
@@ -481,7 +486,7 @@ mod tests {
         assert!((still(true, true) - 0.0075 / 4.0).abs() < 1e-9);
     }
 
-    /// Ten seconds after a reading that was 0.12 beyond the margin: by one's own exponentials.
+    /// Ten seconds after a reading 0.12 beyond the margin, compared with exponentials computed here.
     #[test]
     fn readings_beyond_the_largest_strain_count_more_and_longer_than_those_beyond_rest() {
         let after = |beyond: f64| std::iter::once((beyond, 0.1)).chain(vec![(0.5, 0.1); 100]);
@@ -497,7 +502,7 @@ mod tests {
                 assert_eq!(flags.has(Flag::Extrapolated), expected > 0.0);
             }
         }
-        // No more than of a strain that may be anywhere.
+        // At most the variance of a strain anywhere in the limits.
         assert!((said(parts(1.0), after(9.0)).0 - STATED.variance - 0.0075).abs() < 1e-12);
     }
 }

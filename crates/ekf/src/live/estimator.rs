@@ -6,10 +6,10 @@ use crate::{
 
 /// An estimator of the sensor's own model, which a [`LiveFilter`](super::LiveFilter) runs.
 pub trait SensorEstimator<T: Real, const N: usize, const L: usize>: Estimator<T, N, L> {
-    /// Relaxing branches of the law.
+    /// Number of relaxing branches of the law.
     const BRANCHES: usize;
 
-    /// The state before any reading, at a strain that is known if there is one.
+    /// Returns the state before any reading, at a known strain if there is one.
     fn start(&self, strain: Option<Gaussian<T>>) -> Self::State;
 }
 

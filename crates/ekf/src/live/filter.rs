@@ -20,7 +20,7 @@ use crate::{
 /// ```
 pub const KNOWN_BEYOND: f64 = 0.1;
 
-/// No time since the last reading.
+/// Returns a pause of zero length, at a reading.
 fn at_reading<T: Real, E: SensorEstimator<T, N, L>, C, const N: usize, const L: usize>(
     estimator: &Substeps<E>,
     parts: &LiveParts<T, C>,
@@ -40,7 +40,7 @@ pub struct LiveEstimate<T> {
     pub flags: Flags,
 }
 
-/// A row: its estimate, and what a smoother or a fixed lag needs besides.
+/// A row: its estimate, and additional data for a smoother or a fixed lag.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LiveRow<T, S> {
@@ -48,14 +48,14 @@ pub struct LiveRow<T, S> {
     pub estimate: LiveEstimate<T>,
     /// The strain before doubts.
     pub stated: Gaussian<T>,
-    /// The flags that doubts raise.
+    /// Flags raised by doubts.
     pub doubts: Flags,
-    /// The row's reading and its use.
+    /// The row's reading, and its use by the filter.
     pub measured: Measured<T>,
-    /// The state predicted at a row whose reading was not used; at one whose reading was, the state is the filter's
+    /// The state predicted at a row without a used reading. With a used reading, the state is that of the filter
     /// ([`LiveFilter::state`]).
     pub look: Option<S>,
-    /// The pause up to this row, before whole steps of it were passed.
+    /// The pause up to this row, before its whole steps were passed.
     pub pause: Pause<T>,
 }
 
@@ -63,27 +63,27 @@ impl<T, S> LiveRow<T, S> {
     /// Converts the state.
     ///
     /// # Errors
-    /// That of the conversion.
+    /// The error of the conversion.
     pub fn try_map<R, E>(self, convert: impl FnOnce(S) -> Result<R, E>) -> Result<LiveRow<T, R>, E> {
         let Self { estimate, stated, doubts, measured, look, pause } = self;
         Ok(LiveRow { estimate, stated, doubts, measured, look: look.map(convert).transpose()?, pause })
     }
 }
 
-/// A reading and its use.
+/// A reading, and its use by the filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Measured<T> {
-    /// The verdict on it.
+    /// The verdict on the reading.
     pub verdict: ReadingVerdict,
-    /// The reading, R/R₀ - 1 of R₀ as it is followed; `None` if there was none.
+    /// The reading, R/R₀ - 1 with R₀ as tracked; `None` if there was none.
     pub reading: Option<Reading<T>>,
-    /// The reading with the noise that the filter gave it; `None` if it was not used.
+    /// The reading with the noise assigned by the filter; `None` if it was not used.
     pub used: Option<Reading<T>>,
-    /// Normalised innovation squared of the reading as it came; `None` if it was not compared.
+    /// Normalised innovation squared of the original reading; `None` if it was not compared.
     pub nis: Option<T>,
-    /// Jump of the readings, if the filter has looked again: at the second in a row that startles
-    /// (by five standard deviations), [`Sieve::jump`] away from the last that did not surprise.
+    /// Jump of the readings, if it caused a second look: at the second reading in a row beyond five standard
+    /// deviations, and farther than [`Sieve::jump`] from the last one that did not surprise.
     pub jumped: Option<T>,
     /// Factor on the covariance of the state before the step, at a readmission ([`Guard`]).
     inflation: T,
@@ -97,16 +97,16 @@ impl<T: Real> Measured<T> {
         Self { verdict, reading: None, used: None, nis: None, jumped: None, inflation: T::one() }
     }
 
-    /// True for a reading that was weighed down for standing far from what was expected.
+    /// True for a reading that was downweighted because it was far from its expectation.
     pub fn surprises(&self) -> bool {
         self.verdict == ReadingVerdict::Downweighted && self.nis.is_none_or(|nis| nis > T::of(SURPRISING_NIS))
     }
 }
 
-/// A sensor's filter with all that stands around it, in fixed memory.
+/// A sensor's filter with the components around it, in fixed memory.
 ///
-/// Only a reading that is used moves it on: a row without one is predicted from the last reading, so that a pause may be one step or
-/// many. The first row takes no time. An error leaves it as it was.
+/// Only a used reading advances the state. A row without one is predicted from the last used reading, so that a pause may be one
+/// row or many. No time passes before the first row. An error leaves the filter unchanged.
 pub struct LiveFilter<T: Real, E: SensorEstimator<T, N, L>, C, const N: usize, const L: usize> {
     estimator: Substeps<E>,
     guard: Guard<T>,
@@ -114,11 +114,11 @@ pub struct LiveFilter<T: Real, E: SensorEstimator<T, N, L>, C, const N: usize, c
     protections: Protections,
     /// Plausibility limits on a reading, under these protections.
     sieve: Sieve<T>,
-    /// R₀ of the law, moved by the measured reading at rest if one was given.
+    /// R₀ of the law, adjusted to the measured reading at rest if one was given.
     rest_reading: T,
-    /// State before any reading.
+    /// Estimator's state before any reading.
     fresh: E::State,
-    /// The way over a pause, prepared.
+    /// The prepared steps of a pause.
     prepared: (Pause<T>, Repeated<E::Prepared, T>),
     now: Memory<T, E::State>,
 }
@@ -127,18 +127,18 @@ pub struct LiveFilter<T: Real, E: SensorEstimator<T, N, L>, C, const N: usize, c
 #[derive(Clone, Copy)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Memory<T, S> {
-    /// State at the last reading that was used, or after whole steps of a pause after it; and the time since then.
+    /// State at the last used reading, or after whole steps of the pause that follows; `pause` is the time since then.
     state: S,
     pause: Pause<T>,
     streak: Streak,
     repeats: Repeats<T>,
     jumps: Jumps<T>,
-    /// Features that the correction computes from readings, if there is a correction.
+    /// Features of the readings, if there is a correction.
     watched: Option<ReadingFeatures<T>>,
-    /// The filter's variance at the last reading that it saw.
+    /// The filter's variance at the last reading included in the features.
     known_variance: T,
     doubts: Doubts<T>,
-    /// Follower of R₀; `None` if R₀ is given, or does not follow.
+    /// Follower of R₀; `None` if R₀ is given, or following is off.
     follower: Option<RestFollower<T>>,
 }
 
@@ -146,7 +146,7 @@ impl<T, S> Memory<T, S> {
     /// Converts the state.
     ///
     /// # Errors
-    /// That of the conversion.
+    /// The error of the conversion.
     pub fn try_map<R, E>(self, convert: impl FnOnce(S) -> Result<R, E>) -> Result<Memory<T, R>, E> {
         let Self { state, pause, streak, repeats, jumps, watched, known_variance, doubts, follower } = self;
         let state = convert(state)?;
@@ -198,22 +198,22 @@ where
         &self.estimator.0
     }
 
-    /// The estimate at the last reading that was used, uncorrected; in a long pause without one somewhat later.
+    /// Returns the uncorrected state at the last used reading, or somewhat later in a long pause.
     pub const fn state(&self) -> &E::State {
         &self.now.state
     }
 
-    /// The estimator with long steps divided, for steps back.
+    /// Returns the estimator that divides long steps, for backward steps.
     pub const fn substeps(&self) -> &Substeps<E> {
         &self.estimator
     }
 
-    /// The state between steps, for [`Self::return_to`].
+    /// Returns the state between steps, for [`Self::return_to`].
     pub fn memory(&self) -> Memory<T, E::State> {
         self.now.clone()
     }
 
-    /// Returns the filter to a remembered state.
+    /// Restores a state from [`Self::memory`].
     pub fn return_to(&mut self, memory: &Memory<T, E::State>) {
         self.now = memory.clone();
     }
@@ -228,25 +228,25 @@ where
         &self.now.doubts
     }
 
-    /// Relative deviation of the followed R₀ from the calibrated or given one.
+    /// Returns the relative deviation of the tracked R₀ from the calibrated or given one.
     pub fn rest_off(&self) -> T {
         self.now.follower.map_or(T::zero(), |follower| follower.off())
     }
 
-    /// The strain is known now: what was doubted of it is gone.
+    /// Clears the doubts about the strain, which is now known.
     pub fn settle(&mut self) {
         self.now.doubts.settle();
     }
 
-    /// The usual time on, with a reading in the unit of the calibration.
+    /// Advances by the usual time step, with a reading in the unit of the calibration.
     ///
     /// # Errors
-    /// If even a prediction is refused.
+    /// If even a prediction is rejected.
     pub fn step(&mut self, reading: T) -> Result<LiveEstimate<T>, StepError> {
         self.step_after(self.parts.dt_s, Some(self.relative(reading, T::zero())))
     }
 
-    /// The usual time on, without a reading.
+    /// Advances by the usual time step, without a reading.
     ///
     /// # Errors
     /// As [`Self::step`].
@@ -254,8 +254,8 @@ where
         self.step_after(self.parts.dt_s, None)
     }
 
-    /// Converts a reading in the unit of the calibration, with the standard deviation that its electronics add, to R/R₀ - 1 of the R₀ that
-    /// was calibrated, or given since.
+    /// Converts a reading in the unit of the calibration, with the standard deviation that its electronics add, to R/R₀ - 1 with
+    /// the calibrated R₀, or the one given since.
     pub fn relative(&self, reading: T, reading_sd: T) -> Reading<T> {
         let sd = reading_sd / self.rest_reading;
         Reading { value: (reading - self.rest_reading) / self.rest_reading, extra_variance: sd * sd }
@@ -264,7 +264,8 @@ where
     /// Sets the measured reading of the rested, unstretched sensor, from now on.
     ///
     /// # Errors
-    /// If it is not a positive number, or not within a factor of [`FARTHEST_REST`] of what it read in calibration.
+    /// If it is not a positive number, or not within a factor of [`FARTHEST_REST`] of the reading at rest in
+    /// calibration.
     pub fn rest(&mut self, measured: T) -> Result<(), StepError> {
         self.rest_reading = self.rest_reading_at(measured)?;
         self.now.follower = None;
@@ -272,19 +273,19 @@ where
         Ok(())
     }
 
-    /// The sensor rests now, unstretched, and reads `measured`: begins again from there.
+    /// Restarts with the sensor at rest, unstretched, and its reading `measured`.
     ///
     /// # Errors
     /// As [`Self::rest`].
     pub fn rezero(&mut self, measured: T) -> Result<(), StepError> {
         self.rest_reading = self.rest_reading_at(measured)?;
-        // Where it is always stretched somewhat nobody knows by how much.
+        // If the sensor is always stretched, its strain at rest is unknown.
         self.start_at(may_be_unstretched(&self.parts.limits).then(T::zero));
         self.now.follower = None;
         Ok(())
     }
 
-    /// Begins again, at a strain that is known if there is one.
+    /// Restarts, at a known strain if there is one.
     pub fn start_at(&mut self, strain: Option<T>) {
         let known = strain.map(|mean| Gaussian { mean, variance: self.parts.known_variance });
         let start = (self.estimator.0.start(known), at_reading(&self.estimator, &self.parts));
@@ -307,10 +308,10 @@ where
         if is_plausible { Ok(self.parts.rest_reading * times) } else { Err(StepError::ImplausibleRest) }
     }
 
-    /// `dt_s` seconds on, with a reading ([`Self::relative`]) or without; the first row takes no time.
+    /// Advances by `dt_s` seconds, with a reading ([`Self::relative`]) or without; no time passes before the first row.
     ///
     /// # Errors
-    /// As [`Self::step`]; or if `dt_s` is no length of a step.
+    /// As [`Self::step`]; or if `dt_s` is negative or not finite.
     pub fn step_after(&mut self, dt_s: T, reading: Option<Reading<T>>) -> Result<LiveEstimate<T>, StepError> {
         self.row_after(dt_s, reading).map(|row| row.estimate)
     }
@@ -322,7 +323,7 @@ where
     #[inline]
     pub fn row_after(&mut self, dt_s: T, reading: Option<Reading<T>>) -> Result<LiveRow<T, E::State>, StepError> {
         check_time_step(dt_s)?;
-        // Single precision has no square of much more.
+        // The square of a much longer time would overflow in single precision.
         let dt_s = if self.now.doubts.runs() { dt_s.min(T::of(LONGEST_PAUSE_S)) } else { T::zero() };
         let (measured, look, pause) = self.take(dt_s, reading)?;
         let moments = look.as_ref().unwrap_or(&self.now.state).moments();
@@ -351,7 +352,7 @@ where
         Ok(LiveRow { estimate, stated, doubts, measured, look, pause })
     }
 
-    /// The step that the last row took from `before`, the state then, if its reading was used ([`LiveRow::measured`]).
+    /// Returns the step of the last row from the state `before` it, if its reading was used ([`LiveRow::measured`]).
     pub fn past_step(
         &self,
         before: &E::State,
@@ -361,8 +362,8 @@ where
         PastStep { from, prepared: self.prepared.1, reading: measured.used }
     }
 
-    /// Takes a reading, if it is one, and looks again where readings have jumped. A row without one is a look ahead from the last:
-    /// the state there comes back, and the pause up to it.
+    /// Takes a reading if it is plausible, and a second look if readings have jumped. For a row without a used reading, also
+    /// returns the state predicted from the last one, and the pause up to it.
     #[allow(clippy::type_complexity, reason = "parts of a row")]
     fn take(
         &mut self,
@@ -377,7 +378,7 @@ where
             Ok(seen) => (seen, None),
             Err(verdict) => (None, Some(verdict)),
         };
-        // Before the first reading there is nothing to predict from.
+        // No time passes before the first reading.
         let since = if self.now.doubts.has_begun() { self.now.pause.after(dt_s) } else { self.now.pause };
         let (mut pause, mut moved) = (since, None);
         if seen.is_none() && pause.clone().whole_step().is_some() {
@@ -413,7 +414,7 @@ where
         Ok((measured, look, since))
     }
 
-    /// Prepares the way over a pause, unless it is.
+    /// Prepares the steps of a pause, unless they are already prepared.
     fn prepare(&mut self, pause: Pause<T>) {
         let pause = self.estimator.told_apart(pause);
         if pause != self.prepared.0 {
@@ -421,7 +422,7 @@ where
         }
     }
 
-    /// Passes a reading that the filter has used to the correction.
+    /// Passes a reading used by the filter to the correction.
     fn watch(&mut self, dt_s: T, measured: &Measured<T>, filtered: Gaussian<T>) {
         if let Some(watched) = &mut self.now.watched {
             watched.step_unless(measured.surprises(), dt_s, measured.used.map(|used| used.value));
@@ -431,12 +432,13 @@ where
         }
     }
 
-    /// The filter's strain, moved into the limits.
+    /// Returns the filter's strain, clamped to the limits.
     fn filtered(&self, belief: &Belief<T, N, L>) -> Gaussian<T> {
         reported(Gaussian::marginal(belief, 0), self.parts.strain_sd_scale, &self.parts.limits)
     }
 
-    /// The filter's strain, corrected; where a reading is missing its variance grows by as much as the filter's has grown since.
+    /// Returns the corrected strain of the filter. While readings are missing, its variance grows as much as the filter's has
+    /// since the last one.
     fn corrected(&self, state: &E::State, belief: &Belief<T, N, L>, filtered: Gaussian<T>) -> Gaussian<T> {
         let (Some((_, learned)), Some(watched)) = (&self.parts.learned, &self.now.watched) else { return filtered };
         let Some(features) = watched.now() else { return filtered };
@@ -488,14 +490,15 @@ impl<T: Real, S> Memory<T, S> {
     }
 }
 
-/// A filter's strain as it is reported: moved into the limits, its deviation by a factor larger, and not less than zero.
+/// Returns a filter's strain as reported: clamped to the limits, with its standard deviation times a factor, and its
+/// variance not negative.
 #[must_use]
 pub fn reported<T: Recordable>(strain: Gaussian<T>, sd_scale: T, limits: &StrainRange<T>) -> Gaussian<T> {
     let variance = strain.variance.max(T::zero()) * sd_scale * sd_scale;
     Gaussian { mean: strain.mean, variance }.clamped(limits)
 }
 
-/// True if the strain may be zero: within the limits, or a little beyond.
+/// True if the strain may be zero: zero lies within the limits, or slightly beyond.
 #[must_use]
 pub fn may_be_unstretched<T: Real>(limits: &StrainRange<T>) -> bool {
     limits.lower.max(-limits.upper) <= T::of(KNOWN_BEYOND) * limits.span()

@@ -2,7 +2,7 @@ use core::fmt;
 
 use crate::ReadingVerdict;
 
-/// Flags of an estimate: all that is reported about it besides its numbers.
+/// Flags of an estimate: everything reported about it besides its numbers.
 ///
 /// ```
 /// use ohmstrain_ekf::live::{Flag, Flags};
@@ -24,36 +24,37 @@ pub struct Flags(u16);
 pub enum Flag {
     /// Missing reading.
     Missing,
-    /// The converter stood at an end of its scale.
+    /// The converter's code was at an end of its scale.
     Saturated,
-    /// A gate, or the numbers, turned the reading down.
+    /// The reading was rejected by a gate, or because of the limits of floating-point numbers.
     Rejected,
-    /// The reading was surprising, by three standard deviations or more, and taken with less weight.
+    /// The reading was off by three standard deviations or more, and taken with reduced weight.
     Downweighted,
-    /// Nothing that this sensor can read; it was not taken.
+    /// Not a possible reading of this sensor; it was not taken.
     Implausible,
     /// The same number for longer than in calibration; it was not taken.
     Stuck,
-    /// Taken though beyond the gate, because too many in a row were turned down.
+    /// Taken although beyond the gate, because too many in a row were rejected.
     Readmitted,
     /// Ramp border nearby: at the present speed the reading hardly depends on the strain.
     RampBorder,
-    /// The strain stands at a limit.
+    /// The strain is at a limit.
     AtLimit,
-    /// The filter has only just begun, at an unknown strain.
+    /// The filter has just started, at an unknown strain.
     StartUp,
-    /// Readings have jumped, or come again after there were none to be believed: the estimate finds its way back.
+    /// Readings have jumped, or have returned after a time without plausible ones: the estimate is recovering.
     Recovering,
-    /// Readings are, or have been, outside of calibration's, or the strain changes much faster.
+    /// Readings are, or recently were, outside the calibrated range, or the strain changes much faster than in
+    /// calibration.
     Extrapolated,
-    /// Run longer than any recording of the calibration.
+    /// The run is longer than any recording of the calibration.
     LongRun,
-    /// The sensor does not rest where it rested in calibration: R₀ is another one.
+    /// The reading at rest is not that of the calibration: R₀ has changed.
     RestMoved,
 }
 
 impl Flag {
-    /// All of them.
+    /// All flags.
     ///
     /// ```
     /// assert_eq!(ohmstrain_ekf::live::Flag::ALL.len(), 14);
@@ -75,7 +76,7 @@ impl Flag {
         Self::RestMoved,
     ];
 
-    /// Its name in `estimates.csv`.
+    /// Name in `estimates.csv`.
     ///
     /// ```
     /// assert_eq!(ohmstrain_ekf::live::Flag::AtLimit.name(), "at_limit");
@@ -142,7 +143,7 @@ impl Flags {
         Self(self.0 | (raised as u16) << flag as u16)
     }
 
-    /// Returns the flags raised in either.
+    /// Returns the flags raised in either set.
     ///
     /// ```
     /// use ohmstrain_ekf::live::{Flag, Flags};
@@ -167,7 +168,7 @@ impl Flags {
         self.0 >> flag as u16 & 1 == 1
     }
 
-    /// Names of those that are raised, in order.
+    /// Returns the names of the raised flags, in order.
     ///
     /// ```
     /// use ohmstrain_ekf::live::{Flag, Flags};

@@ -1,6 +1,6 @@
 use crate::Recordable;
 
-/// Recent size of a filter's innovations against the stated one: the mean of their normalised squares.
+/// Recent size of a filter's innovations relative to the stated one: the mean of their normalised squares.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Innovations<T> {
@@ -8,7 +8,7 @@ pub struct Innovations<T> {
 }
 
 impl<T: Recordable> Innovations<T> {
-    /// Cap on a normalised innovation squared: a single outlier is not a law that does not fit.
+    /// Cap on a normalised innovation squared, so that a single outlier does not count as a misfit of the law.
     pub const MOST: f64 = 30.0;
 
     /// Starts before any innovation.
@@ -17,7 +17,7 @@ impl<T: Recordable> Innovations<T> {
         Self { mean: T::zero() }
     }
 
-    /// Takes a normalised innovation squared, where `left` is the share of what was known before that is left.
+    /// Takes a normalised innovation squared; `left` is the remaining weight of the previous mean.
     pub fn see(&mut self, left: T, nis: T) {
         self.mean += (T::one() - left) * (nis.min(T::of(Self::MOST)) - self.mean);
     }

@@ -4,19 +4,19 @@ use crate::Recordable;
 pub const SURPRISING_NIS: f64 = 9.0;
 /// Normalised innovation squared above which a reading startles: five standard deviations.
 const STARTLING_NIS: f64 = 25.0;
-/// Number of startling readings in a row after which a filter looks again.
+/// Number of startling readings in a row that triggers a second look.
 const BESIDE_AFTER: f64 = 2.0;
-/// Weight that the knowledge from before any reading then gets.
+/// Weight that the initial distribution then gets.
 pub const BESIDE_SHARE: f64 = 0.1;
 
-/// Detector of jumps in the readings, after which a filter looks again. A wrong law, on another day for example, surprises without a
-/// jump: a filter that looked again then would lose what it has learned since.
+/// Detector of jumps in the readings, which trigger a second look of the filter. A wrong law, for example on another day, surprises
+/// without a jump; a second look would then discard what the filter has learned since.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Jumps<T> {
-    /// Readings in a row that startled; those that were kept from the filter do not count.
+    /// Number of startling readings in a row; readings that the filter did not use are ignored.
     pub(crate) startling: T,
-    /// The last one that did not surprise.
+    /// The last reading that did not surprise.
     pub(crate) calm: Option<T>,
 }
 
@@ -27,8 +27,8 @@ impl<T: Recordable> Jumps<T> {
         Self { startling: T::zero(), calm: None }
     }
 
-    /// Takes a reading that the filter has used, and its normalised innovation squared; how far readings have jumped, where the
-    /// filter is to look again: two in a row startle, farther than `jump` from the last that did not surprise.
+    /// Takes a reading used by the filter, and its normalised innovation squared. Returns the jump of the readings if the
+    /// filter needs a second look: two in a row startle, the second farther than `jump` from the last that did not surprise.
     pub fn see(&mut self, reading: T, nis: T, jump: T) -> Option<T> {
         self.startling = if nis > T::of(STARTLING_NIS) { self.startling + T::one() } else { T::zero() };
         let from_calm = self.calm.map(|calm| reading - calm);

@@ -1,10 +1,10 @@
 use crate::correction::{Correction, FILTER_INPUTS, OUTPUTS, Quadratic};
 use crate::{Gaussian, Real};
 
-/// Correction of a filter's strain, with a substitute for training rows that a small chip has no room for.
+/// Correction of a filter's strain, with a substitute for training rows that do not fit on a small microcontroller.
 #[derive(Clone, Copy, Debug)]
 pub struct Learned<'a, T> {
-    /// The rows that are left.
+    /// Correction with the remaining rows.
     pub correction: Correction<'a, T, FILTER_INPUTS>,
     /// Quadratics added to the means of the direct process and of the residual one.
     pub quadratics: Option<[Quadratic<'a, T>; 2]>,
@@ -12,7 +12,7 @@ pub struct Learned<'a, T> {
 
 /// Corrects a filter's strain.
 pub trait Correct<T> {
-    /// The strain of a filter, corrected; arguments as of [`Correction::correct`].
+    /// Returns the corrected strain of a filter; arguments as for [`Correction::correct`].
     fn correct(&self, inputs: &[T; FILTER_INPUTS], filtered: Gaussian<T>, birge: T) -> Gaussian<T>;
 }
 

@@ -1,6 +1,6 @@
-//! A sensor's filter as it runs for days on a machine: plausibility of readings, surprising readings and jumps, R₀ of the day, the
-//! learned correction, and doubts that widen its intervals. It is generic over the precision, so that a computer and a chip run the
-//! same.
+//! A sensor's filter for long-term use: plausibility of readings, surprising readings and jumps, R₀ of the session, the learned
+//! correction, and doubts that widen intervals. It is generic over the precision, so that a computer and a microcontroller run the
+//! same code.
 
 mod doubt;
 mod estimator;

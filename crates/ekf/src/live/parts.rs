@@ -4,16 +4,16 @@ use super::{DoubtParts, RestBounds, Sieve};
 use crate::Recordable;
 use crate::correction::FeatureScale;
 
-/// Surroundings of the estimator in a [`LiveFilter`](super::LiveFilter): all of a sensor's calibration.
+/// Components around the estimator in a [`LiveFilter`](super::LiveFilter), from a sensor's calibration.
 #[derive(Clone, Copy, Debug)]
 pub struct LiveParts<T, C> {
     /// R₀ of the law, in the unit of the readings.
     pub rest_reading: T,
-    /// Reading of the rested, unstretched sensor in calibration, as measured that day; R₀ is fitted with the law.
+    /// Reading of the rested, unstretched sensor in calibration, as measured; R₀ itself is fitted with the law.
     pub rested: T,
     /// Usual time between readings, s.
     pub dt_s: T,
-    /// The longest step that a pause is divided into, s; the estimator's own, if that is shorter.
+    /// Longest step, s, into which a pause is divided; the estimator's own limit if that is shorter.
     pub longest_step_s: T,
     /// Range of the reported strain.
     pub limits: StrainRange<T>,
@@ -21,15 +21,15 @@ pub struct LiveParts<T, C> {
     pub strain_sd_scale: T,
     /// Variance of the model's own noise of R/R₀.
     pub reading_variance: T,
-    /// Variance of a strain that is known at a start.
+    /// Variance of a known strain at a start.
     pub known_variance: T,
     /// Plausibility limits on a reading.
     pub sieve: Sieve<T>,
     /// Parts of the doubts that widen the interval.
     pub doubt: DoubtParts<T>,
-    /// Between which readings R₀ stays.
+    /// Bounds of readings that agree with the calibrated R₀.
     pub rest: RestBounds<T>,
-    /// The scale of the features that the correction sees, and the correction; `None` for the filter's own strain.
+    /// Scale of the correction's features, and the correction; `None` for the uncorrected strain.
     pub learned: Option<(FeatureScale<T>, C)>,
 }
 

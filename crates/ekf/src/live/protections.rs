@@ -1,15 +1,16 @@
-/// Protections of a filter against conditions that no calibration has seen. All of them are on by default.
+/// Protections of a filter against conditions absent from its calibration. All of them are on by default.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Protections {
-    /// Plausibility check: readings that this sensor cannot give, and numbers that repeat too often, count as missing.
+    /// Plausibility check: impossible readings, and numbers that repeat too often, count as missing.
     pub plausibility: bool,
-    /// Bounded influence: a reading beyond three standard deviations counts the less the farther it is.
+    /// Bounded influence: the weight of a reading beyond three standard deviations decreases with its distance.
     pub influence: bool,
-    /// Second look after a jump of the readings, which also follows the knowledge from before any reading; not without `influence`.
+    /// Second look: after a jump of the readings, the filter also follows a hypothesis from its initial distribution; requires
+    /// `influence`.
     pub second_look: bool,
     /// Following: R₀ adapts to readings that stay beyond those of the calibration.
     pub following: bool,
-    /// Doubts: intervals are wider at a start, after a fault, and outside the calibrated range.
+    /// Doubts: wider intervals at a start, after a fault, and outside the calibrated range.
     pub doubts: bool,
 }
 

@@ -1,57 +1,57 @@
-//! R₀ of the day, as far as readings alone tell it, in any precision.
+//! R₀ of a session, estimated from readings alone, in any precision.
 
 use crate::{Reading, Recordable};
 
-/// The numbers behind an R₀ that follows the readings.
+/// Constants of an R₀ that follows the readings.
 struct Following {
-    /// Time constant with which R₀ leaves calibration's for where the readings want it, s.
+    /// Time constant with which R₀ moves away from the calibrated one, s.
     leaves_s: f64,
-    /// Time constant where a whole recording is processed for the one R₀ of all its rows, s.
+    /// Time constant if a whole recording is processed for a single R₀, s.
     settles_s: f64,
-    /// Time constant with which it comes back, s.
+    /// Time constant with which it returns, s.
     returns_s: f64,
-    /// A reading counts for no more than this time, s, however long nothing was read before.
+    /// Longest time that one reading counts for, s, even after a longer gap.
     longest_s: f64,
-    /// Readings that jump back within so long, s, were a fault in between, and not another day.
+    /// Time, s, within which a jump back means that the readings in between were a fault, not a changed R₀.
     fault_s: f64,
-    /// Largest factor between another R₀ and calibration's; a reading that would need more is not of this sensor.
+    /// Largest factor between a tracked R₀ and the calibrated one; a reading that would need a larger one is ignored.
     farthest: f64,
 }
 
-/// `docs/notes/2026-11-23-following-r0-figures.md` has what these were chosen on. A faster start follows another day sooner,
-/// and a fault of 10 s farther.
+/// `docs/notes/2026-11-23-following-r0-figures.md` documents their choice. A shorter `leaves_s` follows a changed R₀ sooner,
+/// but also a fault of 10 s farther.
 const FOLLOWING: Following =
     Following { leaves_s: 40.0, settles_s: 10.0, returns_s: 1.0, longest_s: 2.0, fault_s: 30.0, farthest: 2.0 };
 
-/// Largest factor between a given R₀ and the rested sensor's reading in calibration, either way. Beyond it, the given R₀ is in
-/// another unit, or of another sensor.
+/// Largest factor between a given R₀ and the rested sensor's reading in calibration, either way. Beyond it, the given R₀ has
+/// another unit, or belongs to another sensor.
 ///
 /// ```
 /// assert_eq!(ohmstrain_ekf::live::FARTHEST_REST, 4.0);
 /// ```
 pub const FARTHEST_REST: f64 = 4.0;
 
-/// Between which readings, R/R₀ - 1, a sensor stays while R₀ is what it was in calibration: the strain is within its limits.
+/// Bounds of the readings, R/R₀ - 1, of a sensor with its calibrated R₀ and a strain within its limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RestBounds<T> {
-    /// The least; `None` if unknown.
+    /// The smallest; `None` if unknown.
     pub low: Option<T>,
-    /// The largest.
+    /// The largest; `None` if unknown.
     pub high: Option<T>,
     /// Estimate of R₀ from the first reading of a session; `None` for a calibration on one recording.
     pub start: Option<SessionStart<T>>,
 }
 
-/// Estimate of R₀ from the first reading of a session, by the differences between recordings of the calibration.
+/// Estimate of R₀ from the first reading of a session, based on the differences between recordings of the calibration.
 ///
-/// R₀ differs from session to session: `ln R₀` has the standard deviation s between sessions. A session begins at rest, with a
-/// reading whose logarithm is `ln R₀` plus a constant, to the standard deviation f. The best linear estimate of `ln R₀` from the first
-/// reading is `s²/(s² + f²)` of the way from calibration's R₀ to the one that the reading alone suggests.
+/// R₀ differs from session to session: `ln R₀` has the standard deviation s between sessions. A session begins at rest. The
+/// logarithm of its first reading is `ln R₀` plus a constant, with the standard deviation f. The best linear estimate of `ln R₀` is
+/// `s²/(s² + f²)` of the way from the calibrated value to the one that the reading alone suggests.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SessionStart<T> {
-    /// The usual first reading, R/R₀ - 1.
+    /// Typical first reading, R/R₀ - 1.
     pub reading: T,
     /// Weight of the first reading, `s²/(s² + f²)`, 0 to 1.
     pub weight: T,
@@ -69,11 +69,11 @@ impl RestBounds<f64> {
     }
 }
 
-/// R₀ that follows the readings. It is calibration's as long as they stay in the calibrated range; a reading beyond the range
-/// slowly draws it along, and one beyond the other end soon draws it back (a play as wide as calibration's readings,
-/// with a lag). Where sessions are known to begin at rest, it starts at the value that the first reading suggests ([`SessionStart`]), which
-/// replaces calibration's. Following is right where the sensor moves between the same strains as in calibration, on another day. Where
-/// it is stretched farther, the strain is at its limit in any case.
+/// R₀ that follows the readings. It keeps its calibrated value as long as they stay in the calibrated range. A reading beyond the
+/// range slowly moves it, and one beyond the other end quickly moves it back (backlash as wide as the calibrated readings, with a
+/// lag). If sessions are known to begin at rest, the estimate from the first reading ([`SessionStart`]) replaces the calibrated
+/// value. Following is correct if the sensor moves between the same strains as in calibration, on another day. If it is stretched
+/// farther, the strain is at its limit anyway.
 ///
 /// ```
 /// use ohmstrain_ekf::live::{RestBounds, RestFollower};
@@ -90,21 +90,21 @@ impl RestBounds<f64> {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RestFollower<T> {
     bounds: RestBounds<T>,
-    /// Relative deviation of R₀ from calibration's.
+    /// Relative deviation of R₀ from the calibrated one.
     pub(crate) off: T,
-    /// Relative deviation of R₀ when the session began.
+    /// Relative deviation of R₀ at the start of the session.
     pub(crate) home: T,
-    /// True once R₀ of the session has its start.
+    /// True once the initial R₀ of the session is set.
     pub(crate) has_begun: bool,
-    /// The last reading, none before the first one, and the time since it came, s.
+    /// The last reading, `None` before the first one; `since_s` is the time since then, s.
     pub(crate) last: Option<T>,
     pub(crate) since_s: T,
-    /// Value of `off` when readings last jumped, and the time since, s, in rows that were read.
+    /// Value of `off` at the last jump of the readings, and the time since, s, counted at rows with readings.
     pub(crate) jumped: Option<[T; 2]>,
 }
 
 impl<T: Recordable> RestFollower<T> {
-    /// Starts before any reading, with calibration's R₀.
+    /// Starts before any reading, with the calibrated R₀.
     ///
     /// ```
     /// let bounds = ohmstrain_ekf::live::RestBounds { low: None, high: Some(1.5), start: None };
@@ -115,7 +115,7 @@ impl<T: Recordable> RestFollower<T> {
         Self { bounds, off: T::zero(), home: T::zero(), has_begun: false, last: None, since_s: T::zero(), jumped: None }
     }
 
-    /// Starts a session that begins stretched: its first reading carries no information on R₀.
+    /// Starts a session with a stretched sensor, whose first reading carries no information on R₀.
     ///
     /// ```
     /// let start = Some(ohmstrain_ekf::live::SessionStart { reading: 0.0, weight: 0.5 });
@@ -129,7 +129,7 @@ impl<T: Recordable> RestFollower<T> {
         Self { has_begun: true, ..self }
     }
 
-    /// Returns the relative deviation of R₀ from calibration's.
+    /// Returns the relative deviation of R₀ from the calibrated one.
     ///
     /// ```
     /// let mut follower = ohmstrain_ekf::live::RestFollower::<f64>::new(ohmstrain_ekf::live::RestBounds { low: None, high: None, start: None });
@@ -141,7 +141,7 @@ impl<T: Recordable> RestFollower<T> {
         self.off
     }
 
-    /// A reading relative to R₀ as it is, from one relative to calibration's.
+    /// Converts a reading relative to the calibrated R₀ to one relative to the tracked R₀.
     ///
     /// ```
     /// let follower = ohmstrain_ekf::live::RestFollower::<f64>::new(ohmstrain_ekf::live::RestBounds { low: None, high: None, start: None });
@@ -155,7 +155,8 @@ impl<T: Recordable> RestFollower<T> {
         Reading { value: (reading.value - off) / rest, extra_variance }
     }
 
-    /// A reading relative to R₀ as it was when the session began: the input of doubts.
+    /// Converts a reading relative to the calibrated R₀ to one relative to the R₀ at the start of the session, the
+    /// input of doubts.
     ///
     /// ```
     /// let start = Some(ohmstrain_ekf::live::SessionStart { reading: 0.0, weight: 0.5 });
@@ -170,15 +171,15 @@ impl<T: Recordable> RestFollower<T> {
         (reading - home) / (T::one() + home)
     }
 
-    /// Relative difference of R₀ from calibration's in a session that begins with this reading.
+    /// Returns the relative deviation of R₀ from the calibrated one in a session that begins with this reading.
     fn start(&self, reading: T) -> T {
         let Some(start) = self.bounds.start else { return self.off };
         let off = start.weight * (reading - start.reading) / (T::one() + start.reading);
         off.max(T::of(1.0 / FOLLOWING.farthest - 1.0)).min(T::of(FOLLOWING.farthest - 1.0))
     }
 
-    /// Takes a reading R/R₀ - 1, of calibration's R₀, `dt_s` seconds after the reading before. A repeated number counts
-    /// only when another one comes: it may be stuck.
+    /// Takes a reading R/R₀ - 1, relative to the calibrated R₀, `dt_s` seconds after the previous reading. A repeated
+    /// number is ignored until another one comes, because it may be stuck.
     ///
     /// ```
     /// let bounds = ohmstrain_ekf::live::RestBounds { low: None, high: Some(1.5), start: None };
@@ -193,8 +194,8 @@ impl<T: Recordable> RestFollower<T> {
         self.draw(T::of(FOLLOWING.leaves_s), dt_s, reading);
     }
 
-    /// Readings have jumped by so much. Where they had jumped shortly before, and back from where they have drawn R₀ since, that was a
-    /// fault: R₀ is what it was before.
+    /// Takes a jump of the readings. If they had already jumped within 30 s, and this jump is opposite to the change of R₀ since,
+    /// the time in between was a fault, and the earlier R₀ is restored.
     ///
     /// ```
     /// let bounds = ohmstrain_ekf::live::RestBounds { low: Some(-0.05), high: Some(1.5), start: None };
@@ -243,7 +244,8 @@ impl<T: Recordable> RestFollower<T> {
 }
 
 impl RestFollower<f64> {
-    /// The one R₀ of a recording: what is left when it has been gone through, and once more with that.
+    /// Settles on a single R₀ for a recording: the result of a pass through its rows, and a second pass from that
+    /// result.
     #[must_use]
     pub fn settled(mut self, len: usize, row: impl Fn(usize) -> (f64, Option<Reading<f64>>)) -> Self {
         let first = (0..len).find_map(|k| row(k).1);

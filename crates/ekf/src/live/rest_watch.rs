@@ -1,8 +1,9 @@
-//! Watch that the sensor still rests where it rested in calibration.
+//! Watch for a change of the sensor's reading at rest.
 
 use crate::Recordable;
 
-/// Readings of the sensor at rest in calibration, as R/R₀ - 1: for programs that write a filter in another language.
+/// Readings of the sensor at rest in calibration, as R/R₀ - 1; public for programs that generate a filter in another
+/// language.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RestSeen<T> {
@@ -10,11 +11,11 @@ pub struct RestSeen<T> {
     pub rested: T,
     /// Tolerance of readings at rest around it.
     pub tolerance: T,
-    /// Time for which readings must stay in place to count, s.
+    /// Time for which readings must stay at rest, or beyond it, to count, s.
     pub lasts_s: T,
-    /// 1 where readings grow from rest on, -1 where they fall, 0 where rest is in their midst.
+    /// 1 if readings rise from rest, -1 if they fall, 0 if rest is in the middle of their range.
     pub sign: T,
-    /// The last of calibration's readings on that side.
+    /// The outermost reading of the calibration on the side of rest.
     pub end: T,
 }
 
@@ -32,21 +33,21 @@ impl RestSeen<f64> {
     }
 }
 
-/// Watch for an R₀ that is not calibration's. There are two signs: a sensor that is known to rest and reads something
-/// else, and readings that stay where no strain leads, beyond those at rest. An R₀ that has grown cannot be told from a strain that
-/// is held. A sensor that rests for a while where it rested in calibration ends it.
+/// Watch for an R₀ that differs from the calibrated one. There are two kinds of evidence: a reading of the sensor at known rest
+/// that differs from the calibration's, and readings that stay beyond those at rest, which no strain explains. An increased R₀
+/// cannot be distinguished from a held strain. The finding ends when readings stay for a while at the calibrated reading at rest.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RestWatch<T> {
     seen: RestSeen<T>,
-    /// True if the next reading is one at rest.
+    /// True if the sensor is known to rest at the next reading.
     pub(crate) rests: bool,
-    /// Time for which readings have been beyond those at rest, and near them, s.
+    /// Times, s, for which readings have been beyond those at rest, and near them.
     pub(crate) beyond_s: T,
     pub(crate) near_s: T,
-    /// Smallest distance beyond those at rest over that time.
+    /// Smallest distance beyond those at rest over `beyond_s`.
     pub(crate) least: T,
-    /// Relative deviation of R₀ from calibration's.
+    /// Relative deviation of R₀ from the calibrated one.
     pub(crate) off: T,
 }
 
@@ -66,8 +67,8 @@ impl<T: Recordable> RestWatch<T> {
         Self { seen, rests, beyond_s: T::zero(), near_s: T::zero(), least: T::zero(), off: T::zero() }
     }
 
-    /// Takes a reading R/R₀ - 1, `dt_s` seconds after the row before; tells how far R₀ is off, as a share of it: 0 where
-    /// nothing speaks against it.
+    /// Takes a reading R/R₀ - 1, `dt_s` seconds after the previous one. Returns the relative deviation of R₀, 0 without
+    /// evidence of one.
     ///
     /// ```
     /// use ohmstrain_ekf::live::{RestSeen, RestWatch};
@@ -101,7 +102,7 @@ impl<T: Recordable> RestWatch<T> {
         self.off
     }
 
-    /// Restarts the watch, since R₀ of the day is given.
+    /// Restarts the watch, because the R₀ of the session is given.
     ///
     /// ```
     /// use ohmstrain_ekf::live::{RestSeen, RestWatch};
@@ -116,7 +117,7 @@ impl<T: Recordable> RestWatch<T> {
         *self = Self::new(self.seen, self.rests);
     }
 
-    /// Returns the relative deviation of R₀; 0 if there is no evidence of one.
+    /// Returns the relative deviation of R₀, 0 without evidence of one.
     ///
     /// ```
     /// use ohmstrain_ekf::live::{RestSeen, RestWatch};

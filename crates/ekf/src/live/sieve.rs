@@ -1,21 +1,21 @@
 use super::Protections;
 use crate::{Reading, ReadingVerdict, Recordable};
 
-/// Plausibility check of readings before the filter uses them, and the rule for a number that repeats.
+/// Plausibility check of readings before the filter uses them, with limits on repeated numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sieve<T> {
-    /// Least and largest R/R₀ - 1 that can be a reading of this sensor.
+    /// Smallest and largest plausible reading of this sensor, R/R₀ - 1.
     pub plausible: (T, T),
-    /// Longest time, s, for which a working sensor repeats one number; infinite if that is not known.
+    /// Longest time, s, for which a working sensor repeats one number; infinite if unknown.
     pub longest_repeat_s: T,
-    /// Number of repeats from which on a number is stuck, [`MOST_REPEATS`] or more.
+    /// Number of repeats from which a number is stuck, [`MOST_REPEATS`] or more.
     pub most_repeats: T,
-    /// Largest variance of a reading's own error, (R/R₀)², at which equal numbers are a fault: a coarser converter gives one code
-    /// for as long as the sensor is still.
+    /// Largest variance of a reading's own error, (R/R₀)², at which equal numbers are a fault: a coarser converter repeats one
+    /// code as long as the sensor is still.
     pub fine_variance: T,
-    /// Distance between two readings, R/R₀ - 1, from which on it is a jump.
+    /// Difference of two readings, R/R₀ - 1, beyond which it is a jump.
     pub jump: T,
-    /// Time, s, over which errors of the readings are alike.
+    /// Correlation time of the readings' errors, s.
     pub error_time_s: T,
 }
 
@@ -34,13 +34,13 @@ impl Sieve<f64> {
     }
 }
 
-/// Number of repeats from which on a number is stuck, for readings with fine resolution.
+/// Number of repeats from which a number is stuck, for readings with fine resolution.
 pub const MOST_REPEATS: u32 = 10;
-/// Number of repeats for readings whose step is as coarse as their noise allows: a still sensor gives one code as often.
+/// The same for the coarsest resolution at which repeats count: a still sensor repeats one code that often.
 pub const MOST_CODE_REPEATS: u32 = 300;
 
 impl<T: Recordable> Sieve<T> {
-    /// Returns the sieve that lets everything pass.
+    /// Returns the sieve that accepts everything.
     #[must_use]
     pub fn open() -> Self {
         let endless = T::one() / T::zero();
@@ -54,7 +54,8 @@ impl<T: Recordable> Sieve<T> {
         }
     }
 
-    /// Returns the sieve without the protections that are turned off: no number is implausible, or stuck; readings never jump.
+    /// Returns the sieve without the checks whose protections are off: no number is then implausible or stuck, or readings
+    /// never jump.
     #[must_use]
     pub fn under(self, protections: Protections) -> Self {
         let open = Self::open();
@@ -74,8 +75,8 @@ impl<T: Recordable> Sieve<T> {
     }
 }
 
-/// The share of a reading's information that is new `since_s` seconds after another one, if errors are alike over
-/// `error_time_s`: 1 - exp(-t/T), at least as much as rounding leaves.
+/// Returns the fraction of a reading's information that is new `since_s` seconds after another one, for errors with
+/// correlation time `error_time_s`: 1 - exp(-t/T), bounded below by rounding.
 pub fn news<T: Recordable>(since_s: T, error_time_s: T) -> T {
     if error_time_s > T::zero() {
         let own = -(-since_s / error_time_s).exp_m1();
@@ -85,7 +86,7 @@ pub fn news<T: Recordable>(since_s: T, error_time_s: T) -> T {
     }
 }
 
-/// The last reading, how long ago it came, and how long the same number has been coming.
+/// The last reading, the time since then, and the time for which the same number has repeated.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Repeats<T> {
@@ -103,16 +104,16 @@ impl<T: Recordable> Repeats<T> {
         Self { last: None, since_s: T::zero(), repeated_s: T::zero(), count: T::zero() }
     }
 
-    /// Time has passed, s.
+    /// Advances by `dt_s` seconds.
     pub fn pass(&mut self, dt_s: T) {
         self.since_s += dt_s;
         self.repeated_s += dt_s;
     }
 
-    /// A reading as the filter is to see it, or why it is not to see it. A number that comes for the k-th time in a row is
-    /// given k times the variance: what k equal readings tell grows with the logarithm of k only, as their errors, which are
-    /// the same, do not average out. A reading soon after another one, whose error is still alike, is given so much more
-    /// variance that readings tell as much in a second however many there are. `reading_variance` is that of the model's own noise.
+    /// Returns the reading for the filter, or the reason for withholding it. A number that comes for the k-th time in a row gets k
+    /// times the variance, so that the information in k equal readings grows only with the logarithm of k: their equal errors do
+    /// not average out. A reading soon after another one, whose errors are correlated, gets additional variance, so that the
+    /// information per second does not depend on the sampling rate. `reading_variance` is the variance of the model's own noise.
     ///
     /// # Errors
     /// [`ReadingVerdict::Implausible`] or [`ReadingVerdict::Stuck`].
@@ -144,8 +145,8 @@ impl<T: Recordable> Repeats<T> {
         Ok(Reading { extra_variance, ..reading })
     }
 
-    /// True if the number has repeated for longer than a still sensor gives it. For a converter whose step is not much smaller than the
-    /// noise more repetitions are taken for chance; if its step is larger, none is a fault.
+    /// True if the number has repeated for longer than that of a still sensor. If the converter's step is not much smaller than the
+    /// noise, more repetitions count as chance; if it is larger, repetition is never a fault.
     fn is_stuck(&self, sieve: &Sieve<T>, extra_variance: T) -> bool {
         let codes = T::of(f64::from(MOST_CODE_REPEATS));
         let most = if extra_variance > T::zero() { codes } else { sieve.most_repeats };
@@ -158,7 +159,8 @@ mod tests {
     use super::{Repeats, Sieve};
     use crate::Reading;
 
-    /// Information, in readings, that `seconds` of readings every `dt_s` bring if their errors are alike over `error_time_s`.
+    /// Returns the information, in independent readings, of `seconds` of readings every `dt_s` with error correlation time
+    /// `error_time_s`.
     fn information(dt_s: f64, seconds: f64, error_time_s: f64) -> f64 {
         let sieve = Sieve::open().with_error_time(error_time_s);
         let mut repeats = Repeats::none();
@@ -171,7 +173,8 @@ mod tests {
         (0..=rows).map(of_row).sum()
     }
 
-    /// The first reading counts as one, each other one as 1 - exp(-dt/T): together 1 + t/T for small steps, to dt/2T.
+    /// The first reading counts as one, each other one as 1 - exp(-dt/T): in total 1 + t/T for small steps, to a
+    /// relative dt/2T.
     #[test]
     fn readings_with_errors_alike_tell_as_much_in_a_second_however_many() {
         let (seconds, error_time_s) = (40.0, 2.0);
@@ -180,9 +183,9 @@ mod tests {
             let relative = (information(dt_s, seconds, error_time_s) / expected - 1.0).abs();
             assert!(relative <= 0.5 * dt_s / error_time_s, "{dt_s}: {relative}");
         }
-        // Errors of their own: every reading is one.
+        // Independent errors: every reading counts as one.
         assert_eq!(information(0.1, seconds, 0.0), 401.0);
-        // Far apart readings are, too: exp(-20) of one is left out, 40 s / 40 s + 1 of them.
+        // So does every reading far apart, to exp(-20); there are 40 s / 40 s + 1.
         assert!((information(40.0, seconds, 2.0) - 2.0).abs() < 1e-8);
     }
 }

@@ -1,12 +1,12 @@
-//! Watch that readings turn as often as they did in calibration.
+//! Watch for readings that turn less often than in calibration.
 
 use crate::Recordable;
 
-/// Turns of the readings in calibration, as R/R₀ - 1: for programs that write a filter in another language.
+/// Turns of the readings in calibration, as R/R₀ - 1; public for programs that generate a filter in another language.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TurnSeen<T> {
-    /// Way back of a reading that counts as a turn.
+    /// Smallest reversal of the readings that counts as a turn.
     pub turn: T,
     /// Longest time between two turns, s.
     pub longest_s: T,
@@ -20,20 +20,20 @@ impl TurnSeen<f64> {
     }
 }
 
-/// Longest times of calibration without a turn from which on it is doubted what readings tell, and after which nothing is believed.
+/// Multiples of the longest time without a turn in calibration: doubt begins at the first, and is complete at the second.
 const DOUBTED: (f64, f64) = (1.2, 1.5);
 
-/// Watch for holds, rests and slow motions that are longer than those of calibration. Readings then creep or stand still for longer than
-/// they ever did, and the relaxation of that time, which calibration has not seen, is easily taken for motion.
+/// Watch for holds, rests and slow motions longer than those of the calibration. Readings then creep or stand still for longer than
+/// the calibration shows, and their relaxation, unknown from calibration, is easily mistaken for motion.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TurnWatch<T> {
     seen: TurnSeen<T>,
-    /// 1 while readings grow, -1 while they fall.
+    /// 1 while readings rise, -1 while they fall.
     pub(crate) direction: T,
-    /// The farthest reading since the last turn; `None` before the first reading.
+    /// The extreme reading since the last turn; `None` before the first reading.
     pub(crate) farthest: Option<T>,
-    /// Time since that reading, and since the last turn, s.
+    /// Times since that reading, and since the last turn, s.
     pub(crate) since_farthest_s: T,
     pub(crate) since_turn_s: T,
 }
@@ -46,7 +46,8 @@ impl<T: Recordable> TurnWatch<T> {
         Self { seen, direction: T::one(), farthest: None, since_farthest_s: zero, since_turn_s: zero }
     }
 
-    /// Takes a reading R/R₀ - 1, `dt_s` seconds after the one before. Returns true if readings have turned: at the farthest one before.
+    /// Takes a reading R/R₀ - 1, `dt_s` seconds after the previous one. Returns true if readings have turned, at the extreme
+    /// reading before.
     ///
     /// ```
     /// use ohmstrain_ekf::live::{TurnSeen, TurnWatch};
@@ -76,7 +77,7 @@ impl<T: Recordable> TurnWatch<T> {
         turns
     }
 
-    /// Time since the last turn, or since the first reading, s.
+    /// Returns the time since the last turn, or since the first reading, s.
     #[must_use]
     pub const fn since_turn_s(&self) -> T
     where
@@ -85,7 +86,7 @@ impl<T: Recordable> TurnWatch<T> {
         self.since_turn_s
     }
 
-    /// Time since the farthest reading after the last turn, s.
+    /// Returns the time since the extreme reading after the last turn, s.
     #[must_use]
     pub const fn since_farthest_s(&self) -> T
     where
@@ -94,17 +95,17 @@ impl<T: Recordable> TurnWatch<T> {
         self.since_farthest_s
     }
 
-    /// States how long readings do not turn, where what comes is known, too.
+    /// Sets the time between turns, s, if later readings are known, too.
     pub fn lasts(&mut self, time_s: T) {
         self.since_turn_s = time_s;
     }
 
-    /// The strain is known now: doubts of it begin anew.
+    /// Restarts the watch, because the strain is now known.
     pub fn settle(&mut self) {
         *self = Self::new(self.seen);
     }
 
-    /// Returns how much is doubted of what readings tell: 0 as long as it is as in calibration, 1 if nothing is believed.
+    /// Returns the doubt about the readings' information, from 0 as in calibration to 1 if they carry none.
     ///
     /// ```
     /// use ohmstrain_ekf::live::{TurnSeen, TurnWatch};

@@ -1,35 +1,36 @@
-//! Bounds on the strain while nothing is read.
+//! Bounds on the strain without readings.
 
 use ohmstrain_model::StrainRange;
 
 use crate::Recordable;
 
-/// Distance that a body can have moved since it was last read.
+/// Distance that a body can have moved since the last reading.
 ///
-/// A motion's pull toward a mean strain, and the spread that this leaves in the long run, are fitted where every row has a
-/// reading: for a pause they promise nothing. Without the pull a rate v̇ = -v/T + noise that was known moves the strain in t
-/// seconds by something of the variance σ²T² (2x - 3 + 4 exp(-x) - exp(-2x)), x = t/T, σ the rate's deviation (Uhlenbeck and
-/// Ornstein, *Phys. Rev.* 36 (1930) 823); here with the same ends, 2x³/3 and 2x - 3, 2x³/(3 + 3x/2 + x²), which differs by
-/// less than a tenth and does not cancel. In the end the strain may be anywhere in the limits, and no farther: its mean square
-/// distance from an estimate m is then span²/12 + (m - centre)².
+/// A motion's pull toward a mean strain, and the resulting stationary spread, are fitted to rows with readings; for a pause
+/// they may not hold. Without the pull, a rate v̇ = -v/T + noise, known at the start, moves the strain in t seconds by a
+/// distance of variance σ²T² (2x - 3 + 4 exp(-x) - exp(-2x)), with x = t/T and σ the standard deviation of the rate (Uhlenbeck
+/// and Ornstein, *Phys. Rev.* 36 (1930) 823). The formula used here is 2x³/(3 + 3x/2 + x²), which has the same limits, 2x³/3
+/// and 2x - 3, differs by less than a tenth, and does not cancel. Eventually the strain may be anywhere in the limits, but no
+/// farther: its mean squared distance from an estimate m is then span²/12 + (m - centre)².
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Unread<T> {
     /// Correlation time of the rate, s.
     pub rate_time_s: T,
-    /// Twice the variance of a path with the rate's deviation for that long.
+    /// 2 (σT)²: twice the variance of a path at a constant rate over `rate_time_s`.
     pub path_variance: T,
-    /// Centre of the limits, and the variance of a strain that is anywhere in them.
+    /// Centre of the limits; `anywhere` is the variance of a strain uniform within them.
     pub centre: T,
     /// See [`Self::centre`].
     pub anywhere: T,
 }
 
-/// Time since the last reading, s, that is assumed before the first reading of all.
+/// Assumed time since the last reading, s, before the first reading.
 pub const NEVER_READ_S: f64 = 1e9;
 
 impl<T: Recordable> Unread<T> {
-    /// Computes the bounds for a motion whose rate lasts for `rate_time_s`, with a standard deviation, 1/s.
+    /// Computes the bounds for a motion whose rate has the correlation time `rate_time_s` and a standard deviation,
+    /// 1/s.
     ///
     /// ```
     /// use ohmstrain_ekf::live::Unread;
@@ -51,7 +52,8 @@ impl<T: Recordable> Unread<T> {
         }
     }
 
-    /// The variance of a strain of which nothing has been read for `seconds`, from what a filter states of it.
+    /// Returns the variance of a strain after `seconds` without a reading, given a filter's estimate and its `stated`
+    /// variance.
     pub fn variance(&self, seconds: T, strain: T, stated: T) -> T {
         let times = seconds / self.rate_time_s;
         let share = times * times / (T::of(3.0) + times * (T::of(1.5) + times));
@@ -78,8 +80,9 @@ impl Unread<f64> {
 mod tests {
     use super::Unread;
 
-    /// The variance of the path by the integral of the rate's covariance, summed naively: a rate known at the start has
-    /// cov(v(s), v(u)) = σ² (exp(-|s - u|/T) - exp(-(s + u)/T)). The midpoint rule with 400 steps is good to 1e-5 of it.
+    /// Returns the variance of the path as the integral of the rate's covariance, summed naively. A rate known at the
+    /// start has cov(v(s), v(u)) = σ² (exp(-|s - u|/T) - exp(-(s + u)/T)). The midpoint rule with 400 steps has a
+    /// relative error of 1e-5.
     fn summed(rate_sd: f64, rate_time_s: f64, seconds: f64) -> f64 {
         let step_s = seconds / 400.0;
         let times = || (0..400).map(|k| (f64::from(k) + 0.5) * step_s);
@@ -92,7 +95,7 @@ mod tests {
     fn a_path_grows_as_its_motion_without_the_pull() {
         let (rate_sd, rate_time_s) = (0.03_f64, 2.0);
         let path_variance = 2.0 * (rate_sd * rate_time_s).powi(2);
-        // Limits so wide that nothing reaches them.
+        // Limits too wide to be reached.
         let unread = Unread { rate_time_s, path_variance, centre: 0.0, anywhere: 1e6 };
         for seconds in [0.02, 0.2, 1.0, 2.0, 4.0, 10.0, 60.0] {
             let found = unread.variance(seconds, 0.0, 0.0);
@@ -101,7 +104,7 @@ mod tests {
         }
     }
 
-    /// However far the estimate is from the strain, within limits: 1.96 deviations reach it, once it may be anywhere.
+    /// Tests that 1.96 standard deviations reach a strain that may be anywhere, from any estimate within the limits.
     #[test]
     fn what_may_be_anywhere_is_covered_everywhere() {
         let unread = Unread { rate_time_s: 2.0, path_variance: 1e-3, centre: 0.15, anywhere: 0.3 * 0.3 / 12.0 };

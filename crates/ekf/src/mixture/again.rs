@@ -1,5 +1,5 @@
-//! A step that is refused is taken again: with more and more noise in its reading, which is more exact than the numbers, and from
-//! smaller and smaller correlations, which rounding may have made more than they can be.
+//! Repetition of a refused step with increasing noise of its reading, which is too exact for the floating-point precision, and
+//! with decreasing correlations, which rounding may have made larger than possible.
 
 use ohmstrain_model::Scalar;
 
@@ -7,14 +7,15 @@ use crate::kernel::MOST_TRIES;
 use crate::mixture::state::Share;
 use crate::{Curve, Reading, SparseEkf, StepError, Switch};
 
-/// Growth of what correlations lose from one try to the next.
+/// Growth, from one try to the next, of the share that correlations lose.
 const LOOSER: f64 = 16.0;
 
-/// Reading of a step, present or missing. There are two types: a program that always has a reading has no code for pauses.
+/// Reading of a step, present or missing. There are two types, so that a program that always has a reading contains no
+/// code for pauses.
 pub(crate) trait StepReading<T: Scalar>: Copy {
     fn as_option(self) -> Option<Reading<T>>;
 
-    /// Returns the reading for a further try of a refused step; the refusal if another try is of no use.
+    /// Returns the reading for another try of a refused step, or the refusal if another try does not help.
     fn again<S: Switch<T>, const B: usize, const N: usize, G: Curve<T>>(
         self,
         kernel: &SparseEkf<T, S, B, N, G>,
@@ -58,7 +59,7 @@ impl<T: Scalar> StepReading<T> for Option<Reading<T>> {
     }
 }
 
-/// Makes correlations smaller, by a share that grows from rounding to all of them over a few tries.
+/// Reduces correlations by a share that grows over a few tries, from rounding to all of them.
 pub(crate) fn loosen<T: Scalar, const N: usize, const L: usize>(shares: &mut [Share<T, N, L>], tries: u32) {
     let share = (0..tries).fold(T::default_epsilon(), |share, _| share * T::of(LOOSER)).min(T::one());
     for Share { belief, .. } in shares {

@@ -12,24 +12,24 @@ use crate::{Belief, StepError};
 /// Collects the children of a step: keeps, merges and drops them.
 pub(crate) struct Children<'a, T, const N: usize, const L: usize, const K: usize> {
     kept: &'a mut Mixture<T, N, L, K>,
-    /// The largest exponent so far; weights are in units of its exponential. What is so much lighter that it has become
-    /// zero would be dropped in the end.
+    /// Largest exponent so far; weights are in units of its exponential. A weight that underflows to zero would be
+    /// dropped in the end anyway.
     exponent: T,
-    /// Sum of all weights, limits aside, of those that were dropped too.
+    /// Sum of all weights without the limits, including those of dropped children.
     density: T,
 }
 
 impl<'a, T: Real, const N: usize, const L: usize, const K: usize> Children<'a, T, N, L, K> {
-    /// Starts collecting children in place of the hypotheses in `kept`, `room` at most.
+    /// Starts collecting at most `room` children, in place of the hypotheses in `kept`.
     #[inline(always)]
     pub(crate) fn new(kept: &'a mut Mixture<T, N, L, K>, room: usize) -> Self {
         kept.clear(room);
         Self { kept, exponent: T::zero(), density: T::zero() }
     }
 
-    /// Adds a child: merged with one that is alike, or in a free place. If there is none, the lightest of all makes room
-    /// and is merged with the nearest of its phase. If it were dropped, step after step, a course that is unlikely in each of many short steps
-    /// and likely in all of them together would be lost before a reading could support it. Returns the child's place.
+    /// Adds a child, merged with a similar one or in a free slot, and returns its place. Without a free slot, the lightest of all
+    /// makes room and is merged with the nearest of its phase. Dropping it would lose motions that are unlikely in each of many
+    /// short steps but likely in all together, before a reading could support them.
     pub(crate) fn add<V: Several<Number = T>, const B: usize>(
         &mut self,
         children: &Parts<V, B>,
@@ -83,8 +83,8 @@ impl<'a, T: Real, const N: usize, const L: usize, const K: usize> Children<'a, T
         self.merge_into_nearest(&displaced, phase, counts, Some(at))
     }
 
-    /// Merges a child into the nearest of its phase, not counting the one at `but`, and returns the place of that; if there is none,
-    /// or it is negligible, it is dropped.
+    /// Merges a child into the nearest of its phase, except the one at `but`, and returns the place of that. A negligible child, or
+    /// one without another of its phase, is dropped.
     #[inline(never)]
     fn merge_into_nearest<const B: usize>(
         &mut self,
@@ -105,7 +105,7 @@ impl<'a, T: Real, const N: usize, const L: usize, const K: usize> Children<'a, T
         Some(at)
     }
 
-    /// Makes room for a larger exponent: the weights so far are given in units of its exponential.
+    /// Rescales the weights so far to units of a larger exponent's exponential.
     fn raise_to(&mut self, exponent: T) {
         let first = self.kept.shares().is_empty();
         if first || exponent > self.exponent {
@@ -118,7 +118,7 @@ impl<'a, T: Real, const N: usize, const L: usize, const K: usize> Children<'a, T
         }
     }
 
-    /// Sum of all weights that were added, limits aside.
+    /// Returns the sum of all added weights, without the limits.
     pub(crate) const fn density(&self) -> Weight<T>
     where
         T: Copy,
@@ -126,7 +126,7 @@ impl<'a, T: Real, const N: usize, const L: usize, const K: usize> Children<'a, T
         Weight { factor: self.density, exponent: self.exponent }
     }
 
-    /// Makes the probabilities sum to one and drops what is negligible.
+    /// Normalises the probabilities to sum to one, and drops negligible hypotheses.
     pub(crate) fn normalise<const B: usize>(&mut self, recorder: &mut impl Recorder<T, B>) -> Result<(), StepError> {
         let heaviest = self.kept.shares().iter().fold(T::zero(), |a, b| if b.weight > a { b.weight } else { a });
         let least = heaviest * T::of(LEAST_WEIGHT);
@@ -167,7 +167,7 @@ impl<T: Real, const N: usize, const L: usize> Share<T, N, L> {
         About { strain: mean[0], strain_variance: covariance[(0, 0)], rate: mean[1], rate_variance: covariance[(1, 1)] }
     }
 
-    /// Takes in another one, with the mean and covariance of the pair.
+    /// Merges another hypothesis into this one, preserving the mean and covariance of the pair.
     fn merge<const B: usize>(&mut self, other: &Parts<T, B>, weight: T, per_inside: T) {
         let total = self.weight + weight;
         if !(total > T::zero()) {

@@ -1,7 +1,7 @@
-//! Common steps of the filters of hypotheses: in place, into an existing state, backwards, and as
-//! [`Estimator`](crate::Estimator), whose prepared step is the filter itself, made for that length.
+//! Common steps of the filters of hypotheses: in place, into an existing state, backwards, and as an
+//! [`Estimator`](crate::Estimator), whose prepared step is the filter itself for steps of that length.
 
-/// Its length of a step, and the estimator, of a filter whose state is `$state`.
+/// Step length and [`Estimator`](crate::Estimator) of a filter whose state is `$state`.
 macro_rules! mixture_filter {
     ($filter:ident<$($size:ident),+>, $state:ident<$($of_state:ident),*>) => {
         impl<T: Real, $(const $size: usize,)+ S: Switch<T>, G: Curve<T>> $filter<T, $($size,)+ S, G> {
@@ -13,7 +13,7 @@ macro_rules! mixture_filter {
             /// Changes the length of steps.
             ///
             /// # Errors
-            /// If `dt_s` is negative or not finite; the filter stays as it was.
+            /// If `dt_s` is negative or not finite; the filter is then unchanged.
             pub fn retime(&mut self, dt_s: T) -> Result<(), StepError> {
                 $crate::clock::check_time_step(dt_s)?;
                 *self = self.every(dt_s);
@@ -76,8 +76,8 @@ macro_rules! over_phases {
     ($filter:ident<$($size:ident),+>) => {
         impl<T: Real, $(const $size: usize),+> $filter<T, $($size),+> {
             /// A filter for steps of `dt_s` seconds.
-            /// - `dwell`: how long phases last and what follows them.
-            /// - `evidence`: what weighs the hypotheses.
+            /// - `dwell`: durations of phases and transitions between them.
+            /// - `evidence`: evidence that weighs the hypotheses.
             ///
             /// # Errors
             /// If `dt_s` is negative or not finite.
@@ -92,8 +92,8 @@ macro_rules! over_phases {
         }
 
         impl<T: Real, $(const $size: usize,)+ S: Switch<T>, G: Curve<T>> $filter<T, $($size,)+ S, G> {
-            /// A filter whose hypotheses step as `kernel` does; the other arguments as for [`Self::new`]. Of its switch only
-            /// the square root is used.
+            /// Creates a filter whose hypotheses step like `kernel`; the other arguments are those of [`Self::new`]. Only
+            /// the square root of the kernel's switch is used.
             pub fn around(kernel: SparseEkf<T, S, B, N, G>, dwell: Dwell<T>, evidence: Evidence<T>) -> Self {
                 Self {
                     dwell,
@@ -104,8 +104,8 @@ macro_rules! over_phases {
                 }
             }
 
-            /// Returns the longest step, s. A phase changes at the beginning of a step: steps are short against
-            /// phases, and no longer than the model's.
+            /// Returns the longest step, s. A phase changes at the beginning of a step, so steps must be short compared
+            /// with phases, and within the model's limit.
             fn longest_s(&self) -> T {
                 self.model().longest_step_s().min(self.dwell.longest_step_s())
             }
@@ -122,13 +122,14 @@ macro_rules! over_phases {
 }
 pub(crate) use over_phases;
 
-/// The steps of a filter whose `step_recorded` makes a [`Mixture`](crate::Mixture) anew, forward and backwards along the same.
+/// Steps of a filter whose `step_recorded` builds a new [`Mixture`](crate::Mixture): forward, and backwards along the same
+/// children.
 macro_rules! mixture_steps {
     () => {
-        /// Predicts one step ahead and takes the reading; without one it is a prediction and returns `None`.
+        /// Predicts one step ahead and takes the reading. Without a reading it only predicts, and returns `None`.
         ///
         /// # Errors
-        /// See [`StepError`]; the state is untouched.
+        /// See [`StepError`]; the state is unchanged.
         #[inline]
         pub fn step<const L: usize>(
             &self,
@@ -155,7 +156,7 @@ macro_rules! mixture_steps {
             }
         }
 
-        /// Steps once, never inlined: a program that steps in place has it once, for the first try and for all others.
+        /// Steps once. Never inlined, so that a program that steps in place contains it once, for all tries.
         #[inline(never)]
         fn step_once<const L: usize>(
             &self,
@@ -168,7 +169,7 @@ macro_rules! mixture_steps {
             Ok(residual)
         }
 
-        /// The same for a program that steps into another state.
+        /// Steps once into another state. Never inlined, for the same reason.
         #[inline(never)]
         fn step_to<const L: usize>(
             &self,
@@ -203,10 +204,10 @@ macro_rules! mixture_steps {
             }
         }
 
-        /// [`Self::step`] into a state that is there already, whatever it was: nothing need be moved.
+        /// Writes the result of [`Self::step`] into an existing state, which saves a move.
         ///
         /// # Errors
-        /// See [`StepError`]; `next` then means nothing.
+        /// See [`StepError`]; `next` is then meaningless.
         #[inline]
         pub fn step_into<const L: usize>(
             &self,
@@ -235,7 +236,7 @@ macro_rules! mixture_steps {
             next: &Mixture<T, N, L, K>,
         ) -> Result<Mixture<T, N, L, K>, StepError> {
             let (mut components, mut smoothed, mut tries) = (Mixture::empty(), *filtered, 0);
-            // As forward, with every try.
+            // With the same tries as forward.
             let following = loop {
                 let mut following = Following::<T, B, N, L, K>::new(self.model(), self.kernel.dt_s());
                 match self.step_recorded(&smoothed, reading, &mut components, &mut following) {

@@ -6,7 +6,7 @@ use crate::mixture::LEAST_INSIDE;
 use crate::mixture::predicted::Predicted;
 use crate::{Curve, Innovation, Reading, Residual, SparseEkf, StepError, Switch};
 
-/// Evidence that weighs hypotheses, in every filter that keeps several.
+/// Evidence that weighs the hypotheses of a filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -19,10 +19,10 @@ pub struct Evidence<T> {
 }
 
 impl<T: Scalar> Evidence<T> {
-    /// Limits and tempering, checked.
+    /// Creates evidence from limits and tempering.
     ///
     /// # Errors
-    /// If the limits are not in order, or the tempering is not a number from 0 to 1.
+    /// If the limits are not in order, or the tempering is not in the range 0 to 1.
     pub fn new(limits: StrainRange<T>, tempering: T) -> Result<Self, ParameterError> {
         if !(limits.lower < limits.upper) {
             return Err(ParameterError::new("limits", Problem::OutOfRange));
@@ -34,16 +34,17 @@ impl<T: Scalar> Evidence<T> {
     }
 }
 
-/// [`Evidence`] in factors instead of logarithms.
+/// [`Evidence`] as factors instead of logarithms.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Weighing<T> {
     limits: StrainRange<T>,
     tempering: T,
-    /// Squared number of deviations beyond which a tail adds less to 1 than rounding: `Q(z) ≤ exp(-z²/2)/2 = ε/2`.
+    /// Squared number of standard deviations beyond which a tail is below the rounding of 1:
+    /// `Q(z) ≤ exp(-z²/2)/2 = ε/2`.
     clear: T,
 }
 
-/// A weight as `factor · exp(exponent)`: factors have the size of probabilities, exponents any.
+/// A weight `factor · exp(exponent)`: factors are of the size of probabilities, exponents of any size.
 #[derive(Clone, Copy)]
 pub(crate) struct Weight<T> {
     pub factor: T,
@@ -51,7 +52,7 @@ pub(crate) struct Weight<T> {
 }
 
 impl<T: Real> Weight<T> {
-    /// The weight in units of `exp(exponent)`, which is no smaller than its own exponential.
+    /// Returns the weight in units of `exp(exponent)`, where `exponent` is at least its own.
     #[inline(always)]
     pub(crate) fn relative_to(&self, exponent: T) -> T {
         let below = self.exponent - exponent;
@@ -66,14 +67,14 @@ impl<T: Real> Weighing<T> {
         Self { limits: evidence.limits, tempering: evidence.tempering, clear }
     }
 
-    /// Creates a weighing with unchecked limits; in `f32` each may be a placeholder of an input.
+    /// Creates a weighing with unchecked limits, which may be placeholders of inputs in `f32`.
     #[cfg(feature = "record")]
     pub(crate) fn of_any_limits(lower: T, upper: T) -> Self {
         Self::new(Evidence { limits: StrainRange { lower, upper }, tempering: T::one() })
     }
 
-    /// A prior probability times the likelihood of a reading to the power of the tempering, without the constant
-    /// `(2π)^(-tempering/2)`.
+    /// Returns a prior probability times the likelihood of a reading to the power of the tempering, without the
+    /// constant `(2π)^(-tempering/2)`.
     #[inline(always)]
     pub(crate) fn likelihood<V, X>(&self, prior: V, residual: &Residual<V>) -> Weight<V>
     where
@@ -88,7 +89,8 @@ impl<T: Real> Weighing<T> {
         Weight { factor: prior, exponent: (nis + logarithm).scale(half) }
     }
 
-    /// Probability of the limits over what `per_inside` is one over, and one over the probability itself, where it is `wanted`.
+    /// Returns the probability of the limits times `per_inside`, the inverse of the parent's, and the inverse of the
+    /// probability itself, in the lanes `wanted`.
     #[inline(always)]
     pub(crate) fn of_limits<V, X>(&self, (strain, variance): (V, V), per_inside: V, wanted: V::Mask) -> [V; 2]
     where
@@ -100,7 +102,7 @@ impl<T: Real> Weighing<T> {
         let ends = [strain - lower, upper - strain];
         let reach = variance.scale(self.clear);
         let [from_lower, from_upper] = [self.is_clear(ends[0], reach), self.is_clear(ends[1], reach)];
-        // Mostly nothing is near a limit.
+        // Usually nothing is near a limit.
         let near = V::without(wanted, V::either(V::both(from_lower, from_upper), (-variance).not_negative()));
         if V::none(near) {
             return [per_inside, one];
@@ -119,14 +121,14 @@ impl<T: Real> Weighing<T> {
         V::both(distance.nothing().less(distance), reach.less(distance * distance))
     }
 
-    /// Calls [`Self::inside_near`] out of line, apart from numbers that are not near a limit.
+    /// Calls [`Self::inside_near`] out of line, separate from the common path for numbers far from the limits.
     #[inline(never)]
     fn inside_near_apart<V: Falls<Number = T>, X: Switch<V>>(&self, ends: [V; 2], variance: V, near: V::Mask) -> V {
         self.inside_near::<V, X>(ends, variance, near)
     }
 
-    /// Probability that a strain lies within the limits, so far above the lower and below the upper, where a tail counts. What has
-    /// left the limits altogether is no less likely than [`LEAST_INSIDE`].
+    /// Returns the probability that a strain lies within the limits, from its distances above the lower and below the upper limit,
+    /// if a tail counts. It is at least [`LEAST_INSIDE`], even far outside the limits.
     #[inline(always)]
     fn inside_near<V, X>(&self, [above_lower, below_upper]: [V; 2], variance: V, wanted: V::Mask) -> V
     where
@@ -143,7 +145,7 @@ impl<T: Real> Weighing<T> {
         if !V::none(far_counts) {
             beyond_far = V::pick(far_counts, (far * per_sd).tail(far_counts).mass, zero);
         }
-        // Beyond the near end the mass inside is the small number, and is to keep its digits.
+        // Beyond the near limit the mass inside is small, and must keep its digits.
         let is_inside = zero.less(near);
         let beyond_near = (V::pick(is_inside, near, -near) * per_sd).tail(wanted).mass;
         let inside = V::pick(is_inside, one - (beyond_near + beyond_far), beyond_near - beyond_far);
@@ -155,7 +157,7 @@ impl<T: Real> Weighing<T> {
         self.tempering
     }
 
-    /// Squared deviations beyond which a tail does not count.
+    /// Returns the squared number of standard deviations beyond which a tail does not count.
     pub(crate) fn clear(&self) -> T {
         self.clear
     }
@@ -163,11 +165,12 @@ impl<T: Real> Weighing<T> {
 
 /// Weight of a child.
 pub(crate) struct Weighed<T> {
-    /// Its prior probability times the likelihood of the reading.
+    /// Prior probability times the likelihood of the reading.
     pub weight: Weight<T>,
-    /// Its probability of the limits over its parent's, which weighs it too but carries no information on the reading.
+    /// Ratio of its probability of the limits to its parent's, which also enters the weight but carries no information
+    /// on the reading.
     pub more_inside: T,
-    /// One over the probability itself.
+    /// Inverse of its probability of the limits.
     pub per_inside: T,
 }
 
@@ -184,14 +187,14 @@ impl<V: Several> Weighed<V> {
     }
 }
 
-/// Children that have been predicted, before the reading.
+/// Predicted children, before the reading.
 pub(crate) struct PredictedChildren<'a, V: Lanes, X: Switch<V>, const B: usize> {
     pub parts: &'a mut Parts<V, B>,
     pub phase: Phase,
     pub prior: V,
-    /// Spread of the rate that their prediction returned.
+    /// Spread of the rate returned by their prediction.
     pub spread: RateSpread<V, X>,
-    /// One over their parents' probability of the limits.
+    /// Inverse of their parents' probability of the limits.
     pub per_inside: V,
     /// Lanes that hold a child.
     pub alive: V::Mask,
@@ -201,7 +204,7 @@ pub(crate) struct PredictedChildren<'a, V: Lanes, X: Switch<V>, const B: usize> 
 pub(crate) struct UpdatedChildren<V: Lanes> {
     pub prior: V,
     pub alive: V::Mask,
-    /// Lanes whose numbers are sound.
+    /// Lanes with valid numbers.
     pub sound: V::Mask,
     /// Zero without a reading.
     pub residual: Residual<V>,
@@ -209,7 +212,7 @@ pub(crate) struct UpdatedChildren<V: Lanes> {
 }
 
 impl<T: Real, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, B, N, G> {
-    /// Gives children the reading.
+    /// Updates children with the reading.
     #[inline(always)]
     pub(crate) fn weigh<V: Several<Number = T>, X: Switch<V>>(
         &self,
@@ -237,23 +240,23 @@ impl<T: Real, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> SparseE
 /// Comparison of a reading with the prediction of a whole mixture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MixtureResidual<T> {
-    /// Reading minus the mixture's mean of it, and the mixture's variance of it.
+    /// Innovation with respect to the mixture's mean prediction, and its variance under the mixture.
     pub residual: Residual<T>,
-    /// The density, less what does not depend on the reading, as a weight.
+    /// Density of the reading without its constant, as factor and exponent of a weight.
     factor: T,
     exponent: T,
     tempering: T,
 }
 
 impl<T: Scalar> MixtureResidual<T> {
-    /// `density`: sum of all prior weights times likelihoods.
+    /// Compares a reading with the mixture; `density` is the sum of all prior weights times likelihoods.
     pub(crate) fn new(predicted: &Predicted<T>, density: Weight<T>, tempering: T) -> Self {
         let (innovation, variance) = predicted.moments();
         let residual = Residual { innovation, variance, nis: innovation * innovation / variance };
         Self { residual, factor: density.factor / *predicted.weight(), exponent: density.exponent, tempering }
     }
 
-    /// Log density of the reading under the mixture, tempered if the filter tempers.
+    /// Returns the log density of the reading under the mixture, tempered if the filter tempers.
     #[must_use]
     pub fn log_likelihood(&self) -> T {
         self.factor.ln() + self.exponent - T::of(0.5) * self.tempering * T::two_pi().ln()

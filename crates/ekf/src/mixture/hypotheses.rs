@@ -1,8 +1,8 @@
 //! The filter of phase histories.
 //!
 //! # Policy
-//! As [`SparseEkf`](crate::SparseEkf): the state is changed in place, an error leaves it as it was, and nothing takes a
-//! logarithm unless asked or unless the strain is near a limit.
+//! As [`SparseEkf`](crate::SparseEkf): the state is changed in place, an error leaves it unchanged, and logarithms are
+//! computed only on request or if the strain is near a limit.
 
 use core::marker::PhantomData;
 
@@ -21,11 +21,11 @@ use crate::{
     AnyCurve, Compact, Curve, Dwell, Evidence, Gaussian, MixtureResidual, Reading, SparseEkf, StepError, Switch,
 };
 
-/// The best `K` phase histories of a [`SwitchedModel`], each with a Kalman filter of its own: for protocols of ramps and long
-/// holds. A pruned generalised pseudo-Bayes tree.
+/// The `K` most probable phase histories of a [`SwitchedModel`], each with its own Kalman filter: for protocols of ramps and
+/// long holds. A pruned generalised pseudo-Bayes tree.
 ///
-/// Unlike [`Imm`](crate::Imm) it does not mix histories before a step; it keeps those that explain the readings and
-/// merges the ones that have become alike. `G` as for [`SparseEkf`].
+/// Unlike [`Imm`](crate::Imm) it does not mix histories before a step; it keeps those that explain the readings, and
+/// merges similar ones. `G` as for [`SparseEkf`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hypotheses<T, const B: usize, const N: usize, const K: usize, S = Compact, G = AnyCurve<T>> {
     pub(crate) kernel: SparseEkf<T, S, B, N, G>,
@@ -33,7 +33,7 @@ pub struct Hypotheses<T, const B: usize, const N: usize, const K: usize, S = Com
     /// Probabilities of a change of phase over a step, `[from][to]`.
     pub(crate) chain: [[T; 3]; 3],
     pub(crate) weighing: Weighing<T>,
-    /// Rate of a moving phase that begins.
+    /// Initial rate of each phase.
     pub(crate) fresh: [Gaussian<T>; 3],
 }
 
@@ -67,7 +67,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
         self.chain[from.index()]
     }
 
-    /// Nothing: a phase has the direction of its net move.
+    /// Returns no excess path: a phase has the direction of its net displacement.
     #[inline(always)]
     fn turning<V: Several<Number = T>, X: Switch<V>>(
         &self,

@@ -1,11 +1,11 @@
 //! Interacting multiple models.
 //!
-//! Given its phase, a mode's direction is certain: nothing is split, no root is taken. A hold has no rate, and a phase that
-//! begins draws its rate anew, so the rate takes no part in the mixing but through the mode's own.
+//! Given its phase, a mode's direction is certain, so no rate is split and no root is taken. A hold has no rate, and a new
+//! phase starts with a new rate, so only the mode's own rate takes part in the mixing.
 //!
 //! # Policy
-//! As [`SparseEkf`](crate::SparseEkf): the state is changed in place, an error leaves it as it was, and nothing takes a
-//! logarithm unless asked or unless the strain is near a limit.
+//! As [`SparseEkf`](crate::SparseEkf): the state is changed in place, an error leaves it unchanged, and logarithms are
+//! computed only on request or if the strain is near a limit.
 
 use ohmstrain_model::{Phase, SwitchedModel};
 
@@ -34,14 +34,14 @@ pub struct Imm<T, const B: usize, const N: usize, S = Compact, G = AnyCurve<T>> 
     /// Probabilities of a change of phase over a step, `[from][to]`.
     pub(super) chain: [[T; 3]; 3],
     weighing: Weighing<T>,
-    /// Rate of a moving phase that begins.
+    /// Initial rate of each phase.
     pub(super) fresh: [Gaussian<T>; 3],
 }
 
-/// A mode while a step works on it.
+/// A mode during a step.
 struct Mode<T, const B: usize> {
     parts: Parts<T, B>,
-    /// Its probability before the reading; what the reading makes of it.
+    /// Probability before the reading; `weight` is the one after it.
     prior: T,
     weight: Weight<T>,
     /// See [`Weighed`](crate::mixture::evidence::Weighed).
@@ -51,10 +51,10 @@ struct Mode<T, const B: usize> {
 }
 
 impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, B, N, S, G> {
-    /// Predicts one step ahead and takes the reading; without one it is a prediction and returns `None`.
+    /// Predicts one step ahead and takes the reading. Without a reading it only predicts, and returns `None`.
     ///
     /// # Errors
-    /// See [`StepError`]; the state is untouched.
+    /// See [`StepError`]; the state is unchanged.
     #[inline]
     pub fn step<const L: usize>(
         &self,
@@ -62,7 +62,7 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, 
         reading: Option<Reading<T>>,
     ) -> Result<Option<MixtureResidual<T>>, StepError> {
         let (mut reading, mut before, mut tries) = (reading, None, 0);
-        // One place for the first try and for all others: a program has the step once.
+        // One call for all tries, so that a program contains the step once.
         loop {
             match self.step_once(state, reading) {
                 Err(refused) => {
@@ -75,7 +75,7 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, 
         }
     }
 
-    /// Returns the reading for a further try of a refused step, and loosens the state that it starts from.
+    /// Returns the reading for another try of a refused step, and loosens the correlations of its initial state.
     #[cold]
     #[inline(never)]
     fn again<const L: usize>(
@@ -90,10 +90,10 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, 
         Ok(reading)
     }
 
-    /// [`Self::step`] into a state that is there already, whatever it was.
+    /// Writes the result of [`Self::step`] into an existing state.
     ///
     /// # Errors
-    /// See [`StepError`]; `next` then means nothing.
+    /// See [`StepError`]; `next` is then meaningless.
     #[inline]
     pub fn step_into<const L: usize>(
         &self,
@@ -111,7 +111,7 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, 
         state: &mut PhaseMixture<T, N, L>,
         reading: Option<Reading<T>>,
     ) -> Result<Option<MixtureResidual<T>>, StepError> {
-        // Three results that stay where they are: nothing is moved, and a state is written when all of them are there.
+        // The three results are not moved; the state is written once all are available.
         let extend = self.advanced(state, Phase::Extend, reading);
         let hold = self.advanced(state, Phase::Hold, reading);
         let retract = self.advanced(state, Phase::Retract, reading);
@@ -129,8 +129,8 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, 
         Ok(reading.map(|_| MixtureResidual::new(&predicted, density, self.weighing.tempering())))
     }
 
-    /// A mode after the step: its belief, and what is known of its weight. One function for all phases, so that a program
-    /// has it once.
+    /// Returns a mode after the step, with its belief and unnormalised weight. One function serves all phases, so that a
+    /// program contains it once.
     #[inline(never)]
     fn advanced<const L: usize>(
         &self,
@@ -156,8 +156,8 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, 
         Ok(mode)
     }
 
-    /// Mixes the modes into the belief with which `phase` begins or goes on now; returns the phase's own belief if neither is possible. The rate
-    /// of a hold is left out: its prediction does not use it.
+    /// Mixes the modes into the initial belief of `phase` for this step; returns the phase's own belief if the phase is impossible.
+    /// The rate of a hold is left out, because its prediction does not use it.
     #[inline(always)]
     fn mixed<const L: usize>(&self, modes: &[Share<T, N, L>; 3], phase: Phase) -> Mode<T, B> {
         let (zero, to) = (T::zero(), phase.index());
@@ -187,15 +187,15 @@ fn borrowed<T>(result: &Result<T, StepError>) -> Result<&T, StepError> {
     result.as_ref().map_err(|error| *error)
 }
 
-/// The heaviest in front, by two comparisons.
+/// Puts the heaviest first, with two comparisons.
 #[inline(always)]
 fn heaviest_first<T: Real, S>([a, b, c]: [(T, S); 3]) -> [(T, S); 3] {
     let [a, b] = if b.0 > a.0 { [b, a] } else { [a, b] };
     if c.0 > a.0 { [c, b, a] } else { [a, b, c] }
 }
 
-/// Probabilities from weights and what the limits make of them, and the weights' sum. What is lighter than the
-/// heaviest by e⁻¹² gets none.
+/// Returns the probabilities from weights and factors of the limits, and the sum of the weights. A mode lighter than
+/// e⁻¹² of the heaviest gets probability zero.
 #[inline(always)]
 fn shares<T: Real>(weights: [(Weight<T>, T); 3]) -> Result<([T; 3], Weight<T>), StepError> {
     let followed = weights.iter().filter(|(weight, _)| weight.factor > T::zero());

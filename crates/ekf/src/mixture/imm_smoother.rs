@@ -39,7 +39,7 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, 
         Ok(smoothed)
     }
 
-    /// Mixes the belief with which `phase` begins or goes on now, and returns its probability; every part of it is put into `mixing`.
+    /// Mixes the initial belief of `phase` for this step, and returns its probability; its components are written to `mixing`.
     fn mix<const L: usize>(
         &self,
         filtered: &PhaseMixture<T, N, L>,

@@ -1,4 +1,4 @@
-//! Lineage of the children in a step of a filter of hypotheses: the record that its smoother follows backwards.
+//! Lineage of the children in a step of a filter of hypotheses, which its smoother follows backwards.
 
 use nalgebra::{SMatrix, SVector};
 use ohmstrain_model::{Direction, Phase, SwitchedModel, SwitchedStep, Symmetric, Transition};
@@ -11,14 +11,14 @@ use crate::mixture::state::Share;
 use crate::mixture::{Added, moment_match};
 use crate::smooth::rts_step;
 
-/// Recorder of every child that a step of a filter of hypotheses makes. The filter itself uses `()`, which records nothing.
+/// Recorder of every child in a step of a filter of hypotheses. The filter itself uses `()`, which records nothing.
 pub(crate) trait Recorder<T: Real, const B: usize> {
-    /// True if it wants a call for each child.
+    /// True if it needs a call for each child.
     const RECORDS: bool = true;
 
-    /// A child was put into the new mixture, merged or alone.
+    /// Records a child that was put into the new mixture, merged or alone.
     fn record(&mut self, _record: &ChildRecord<'_, T, B>, _added: Added) {}
-    /// The contents of every place moved to another one, or nowhere.
+    /// Records that the contents of every place moved to another one, or were dropped.
     fn renumbered(&mut self, _new_place: impl Fn(usize) -> Option<usize>) {}
 }
 
@@ -26,19 +26,19 @@ impl<T: Real, const B: usize> Recorder<T, B> for () {
     const RECORDS: bool = false;
 }
 
-/// A child, and the step that led to it.
+/// A child, and the step from its parent.
 pub(crate) struct ChildRecord<'a, T, const B: usize> {
     /// Index of the parent hypothesis.
     pub parent: usize,
     pub phase: Phase,
-    /// Starting point: the parent's belief, with a new rate if a phase began.
+    /// Initial belief: the parent's, with a new rate if a phase began.
     pub from: &'a Parts<T, B>,
     /// True if a phase began.
     pub begins: bool,
     pub course: Course<T>,
-    /// The prediction before it was cut.
+    /// The prediction before truncation.
     pub predicted: &'a Parts<T, B>,
-    /// The belief that went into the new mixture, before it was merged with others.
+    /// The updated belief, before merging.
     pub posterior: &'a Parts<T, B>,
     pub weighed: &'a Weighed<T>,
 }
@@ -50,27 +50,27 @@ pub(crate) struct Lineage<T, const N: usize, const L: usize, const K: usize> {
     children: [[Option<Descent<T, N, L>>; 3]; K],
 }
 
-/// A child and where it went.
+/// A child and its component in the new mixture.
 pub(crate) struct Descent<T, const N: usize, const L: usize> {
-    /// Transition from the parent, the renewed rate included.
+    /// Transition from the parent, including a renewed rate.
     pub transition: Transition<T, N, L>,
     pub predicted: Belief<T, N, L>,
     pub posterior: Belief<T, N, L>,
-    /// Logarithm of its share of the new mixture, not normalised.
+    /// Unnormalised log weight in the new mixture.
     pub log_weight: T,
     pub component: usize,
 }
 
-/// Recorder of a step of a sensor's filter: its linearisations are those of the model.
+/// Recorder of a step of a sensor's filter, with linearisations of the model.
 pub(crate) struct Following<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize> {
     pub lineage: Lineage<T, N, L, K>,
     model: &'a SwitchedModel<T, B, N>,
     step: SwitchedStep<T, B>,
 }
 
-/// Limits on smoothed variances, and squared distances of means, over the filter's own: later readings cannot cause larger
-/// ratios. A merged hypothesis represents its children only roughly, and where a state decays
-/// without noise the way back makes an excess grow with every step, e-fold in each time constant: in a gap without bound.
+/// Limits on smoothed variances, and on squared shifts of means, relative to the filtered variances; later readings cannot
+/// cause larger ratios. A merged hypothesis represents its children only approximately. For a state that decays without
+/// noise, the backward pass amplifies an excess e-fold per time constant, in a gap without bound.
 const ASTRAY: [f64; 2] = [4.0, 400.0];
 
 fn is_astray<T: Real, const N: usize, const L: usize>(smoothed: &Belief<T, N, L>, filtered: &Belief<T, N, L>) -> bool {
@@ -81,7 +81,7 @@ fn is_astray<T: Real, const N: usize, const L: usize>(smoothed: &Belief<T, N, L>
     })
 }
 
-/// Children with less of the smoothed weight than this leave no trace in the moments.
+/// Smallest share of the smoothed weight with which a child counts in the moments.
 const LEAST_SHARE: f64 = 1e-7;
 
 impl<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize> Following<'a, T, B, N, L, K> {
@@ -135,8 +135,8 @@ fn whole<T: Real, const B: usize, const N: usize, const L: usize>(parts: &Parts<
     belief
 }
 
-/// Returns the transition from before a phase began: the new rate does not depend on the old one, and its spread is
-/// process noise.
+/// Returns the transition from the state before a phase began: the new rate is independent of the old one, and its
+/// variance is process noise.
 pub(crate) fn through_renewal<T: Real, const N: usize, const L: usize>(
     transition: Transition<T, N, L>,
     fresh_variance: T,
@@ -148,10 +148,10 @@ pub(crate) fn through_renewal<T: Real, const N: usize, const L: usize>(
 }
 
 impl<T: Real, const N: usize, const L: usize> Descent<T, N, L> {
-    /// Returns the smoothed belief of this child, from the smoothed belief of the hypothesis it was merged into.
+    /// Returns the smoothed belief of this child, from the smoothed belief of the hypothesis into which it was merged.
     ///
-    /// A child that is far from the merged mean must not be drawn there: the merged hypothesis counts as the child plus
-    /// noise of the size of their distance, and the smoother goes back through that.
+    /// A child far from the merged mean must not be pulled toward it. The merged hypothesis is therefore modelled as
+    /// the child plus noise of the size of their distance, and smoothed back through that.
     fn unmerged(&self, merged: &Belief<T, N, L>, smoothed: &Belief<T, N, L>) -> Belief<T, N, L> {
         let distance = merged.mean - self.posterior.mean;
         if distance.iter().all(|x| x.is_zero()) {
@@ -186,8 +186,8 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Lineage<T, N, L, K
         }
     }
 
-    /// The hypotheses at the beginning of the step given all readings, into `smoothed`, which are those as they were filtered.
-    /// `components` are those that the step made, `next` the same ones given all readings.
+    /// Smooths the hypotheses at the start of the step: `smoothed` holds the filtered ones and is overwritten. `components`
+    /// are the hypotheses after the step, `next` the same ones smoothed.
     pub(crate) fn smooth(
         &self,
         smoothed: &mut [Share<T, N, L>],
@@ -222,7 +222,7 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Lineage<T, N, L, K
         }
     }
 
-    /// Logarithm of the sum of the weights that were merged into a place.
+    /// Returns the logarithm of the sum of the weights merged into a component.
     fn log_total(&self, component: usize) -> T {
         let weights = || {
             let all = self.children.iter().flatten().flatten();

@@ -3,7 +3,7 @@ use ohmstrain_model::Scalar;
 use crate::kernel::{Part, Parts};
 use crate::{Belief, Gaussian};
 
-/// Mean of one component of the state over a mixture, and its parts around it.
+/// Mean of one component of the state over a mixture, and deviations of its parts.
 #[derive(Clone, Copy)]
 struct Shift<T> {
     /// Index of the component.
@@ -21,14 +21,14 @@ struct Mixing<'a, T, const N: usize, const L: usize> {
     of: [&'a Belief<T, N, L>; 3],
 }
 
-/// Component `i` of a mean. An index that is known while compiling is tested while compiling; if it is not, the test shall
-/// bring no panic.
+/// Returns component `i` of a mean. An index known at compile time is checked at compile time; otherwise the check must
+/// not panic.
 #[inline(always)]
 fn mean<T: Scalar, const N: usize, const L: usize>(belief: &Belief<T, N, L>, i: usize) -> T {
     belief.mean.as_slice().get(i).copied().unwrap_or_else(T::zero)
 }
 
-/// Entry `i`, `j ≤ i` of a covariance; as for [`mean`].
+/// Returns entry `i`, `j ≤ i` of a covariance, like [`mean`].
 #[inline(always)]
 fn covariance<T: Scalar, const N: usize, const L: usize>(belief: &Belief<T, N, L>, i: usize, j: usize) -> T {
     belief.covariance.packed().get(i * (i + 1) / 2 + j).copied().unwrap_or_else(T::zero)
@@ -46,9 +46,9 @@ impl<T: Scalar, const N: usize, const L: usize> Mixing<'_, T, N, L> {
         Shift { i, mean: heaviest + shift, weighted, off: [b - shift, c - shift] }
     }
 
-    /// Returns an entry of the mixture's covariance. With deviations d from the heaviest part's mean and s the mixture's own,
-    /// `Σ w (d - s)(d - s)ᵀ = Σ w d (d - s)ᵀ`, and the heaviest part has d = 0. As its weight is a third at least, s is no more
-    /// than √3 deviations of the mixture, and nothing cancels.
+    /// Returns an entry of the mixture's covariance. With d the deviations from the heaviest part's mean, and s that of the
+    /// mixture, `Σ w (d - s)(d - s)ᵀ = Σ w d (d - s)ᵀ`; the heaviest part has d = 0. Its weight is at least a third, so s is at
+    /// most √3 standard deviations of the mixture, and nothing cancels.
     #[inline(always)]
     fn entry(&self, i: &Shift<T>, j: &Shift<T>) -> T {
         let [w0, w1, w2] = self.weights;
@@ -72,7 +72,7 @@ impl<T: Scalar, const N: usize, const L: usize> Mixing<'_, T, N, L> {
 }
 
 impl<T: Scalar, const B: usize> Parts<T, B> {
-    /// Mean and covariance of a mixture of three, the heaviest first, but for the rate, which is left zero.
+    /// Returns mean and covariance of a mixture of three, the heaviest first, except for the rate, which is zero.
     #[inline(always)]
     pub(crate) fn mixed<const N: usize, const L: usize>(weights: [T; 3], of: [&Belief<T, N, L>; 3]) -> Self {
         let (mixing, zero) = (Mixing { weights, of }, T::zero());
@@ -97,7 +97,7 @@ impl<T: Scalar, const B: usize> Parts<T, B> {
         }
     }
 
-    /// Puts the rate of a moving phase into a mixture: the phase's own with the share `kept`, with the rest a new one,
+    /// Adds the rate of a moving phase to a mixture: the phase's own with weight `kept`, and otherwise a new one,
     /// independent of everything else.
     #[inline(always)]
     pub(crate) fn mix_rate<const N: usize, const L: usize>(

@@ -32,26 +32,27 @@ use crate::{Belief, Gaussian};
 /// Place of a hypothesis after it was added.
 #[derive(Clone, Copy)]
 pub(crate) enum Added {
-    /// Into this place, alone or merged with what was there.
+    /// This place, alone or merged with its previous content.
     To(usize),
-    /// Into this place; what was there was merged into the other one, or dropped if no other is of its phase.
+    /// The first place; its previous content was merged into the second, or dropped because it is negligible or no
+    /// other is of its phase.
     InsteadOf(usize, Option<usize>),
-    /// No place: it is lighter than every hypothesis there is room for, and none of those is of its phase.
+    /// No place: it is not heavier than any kept hypothesis, and it is negligible or none of those is of its phase.
     Nowhere,
 }
 
 /// Threshold below which two hypotheses of one phase are merged: squared distance of their strains plus that of their rates,
 /// each in units of the larger variance.
 pub(crate) const ALIKE: f64 = 0.5;
-/// Hypotheses lighter than the heaviest by this factor, e⁻¹², are dropped.
+/// Fraction of the heaviest weight, e⁻¹², below which hypotheses are dropped.
 pub(crate) const LEAST_WEIGHT: f64 = 6.144_212_353_328_21e-6;
-/// Relative difference of two weights up to which neither hypothesis is the lighter one: directions after a hold are
-/// equally likely, and rounding is not to choose.
+/// Relative difference of two weights up to which neither hypothesis counts as lighter: directions after a hold are
+/// equally likely, and rounding must not decide.
 pub(crate) const LIGHTER: f64 = 1e-4;
-/// A hypothesis that has left the limits altogether is no less likely than this.
+/// Smallest probability of the limits, for a hypothesis far outside.
 pub(crate) const LEAST_INSIDE: f64 = 1e-9;
 
-/// Mean and covariance of a mixture of Gaussians whose weights sum to one.
+/// Returns mean and covariance of a mixture of Gaussians whose weights sum to one.
 pub(crate) fn moment_match<'a, T: Scalar, const N: usize, const L: usize>(
     weighted: impl Iterator<Item = (T, &'a Belief<T, N, L>)> + Clone,
 ) -> Belief<T, N, L> {
@@ -64,7 +65,7 @@ pub(crate) fn moment_match<'a, T: Scalar, const N: usize, const L: usize>(
     Belief { mean, covariance }
 }
 
-/// The same of one component of the state.
+/// Returns mean and variance of one component of the state.
 pub(crate) fn marginal_match<'a, T: Scalar, const N: usize, const L: usize>(
     weighted: impl Iterator<Item = (T, &'a Belief<T, N, L>)> + Clone,
     index: usize,

@@ -3,7 +3,7 @@
 use crate::kernel::{Lanes, Parts};
 use crate::mixture::ALIKE;
 
-/// Moments that tell whether hypotheses are alike.
+/// Moments that determine whether hypotheses are alike.
 #[derive(Clone, Copy)]
 pub(crate) struct About<V> {
     pub strain: V,
@@ -23,7 +23,7 @@ impl<V: Lanes> About<V> {
     #[inline(always)]
     pub(crate) fn is_like(&self, other: &Self) -> V::Mask {
         let alike = self.strain.literal(ALIKE);
-        // Mostly they are not, which the strain tells without a division.
+        // Usually they are not, which the strain shows without a division.
         let apart = self.strain - other.strain;
         let far = (alike * (self.strain_variance + other.strain_variance)).less(apart * apart);
         if V::all(far) {
@@ -37,7 +37,7 @@ impl<V: Lanes> About<V> {
         V::both(near, (strain + self.rate_apart(other)).less(alike))
     }
 
-    /// Squared distance of strains and rates, each in units of the larger variance.
+    /// Returns the squared distance of strains and rates, each in units of the larger variance.
     #[inline(always)]
     pub(crate) fn distance(&self, other: &Self) -> V {
         self.strain_apart(other) + self.rate_apart(other)
@@ -54,11 +54,11 @@ impl<V: Lanes> About<V> {
     }
 }
 
-/// A squared difference in units of the larger variance.
+/// Returns a squared difference in units of the larger variance.
 #[inline(always)]
 fn apart<V: Lanes>(difference: V, one: V, other: V) -> V {
     let (none, square) = (difference.nothing(), difference * difference);
-    // What is known exactly is the same or is not; a difference has no size without a unit.
+    // Exactly known values are either equal or not; without a variance their difference has no scale.
     let differs = none.less(square);
     if V::none(differs) {
         return none;
@@ -66,8 +66,8 @@ fn apart<V: Lanes>(difference: V, one: V, other: V) -> V {
     V::pick(differs, square.over(V::pick(one.less(other), other, one)), none)
 }
 
-/// Takes another hypothesis in, with the mean and covariance of the pair, whose shares sum to one. Covariances are lower triangles,
-/// row by row.
+/// Merges another hypothesis, preserving the mean and covariance of the pair, whose shares sum to one. Covariances are lower
+/// triangles, row by row.
 #[inline(always)]
 pub(crate) fn merge<'a, V: Lanes + 'a, const N: usize>(
     (mean, covariance): (impl Iterator<Item = &'a mut V>, impl Iterator<Item = &'a mut V>),
@@ -76,7 +76,7 @@ pub(crate) fn merge<'a, V: Lanes + 'a, const N: usize>(
 ) {
     let both = mine * theirs;
     let mut apart = *other_mean;
-    // By iterators throughout: an index could panic.
+    // Iterators throughout, because an index could panic.
     for (apart, mine) in apart.iter_mut().zip(mean) {
         *apart -= *mine;
         *mine += *apart * theirs;

@@ -20,14 +20,14 @@ impl<T: Scalar> Pause<T> {
         Self { seconds: T::zero(), open: false }
     }
 
-    /// Adds a step of `dt_s` seconds without a reading; the direction stays open from `longest_s` on.
+    /// Adds a step of `dt_s` seconds without a reading; the direction is open once the pause exceeds `longest_s`.
     pub(crate) fn goes_on(self, dt_s: T, longest_s: T) -> Self {
         let seconds = self.seconds + dt_s;
         Self { seconds, open: seconds > longest_s * T::of(GRACE) }
     }
 }
 
-/// Sums up the probabilities of phases.
+/// Sum of the probabilities of each phase.
 pub(crate) struct PhaseSum<T> {
     pub sums: [T; 3],
     /// True if the phase of a moving hypothesis follows from the sign of its rate.

@@ -1,7 +1,7 @@
 use ohmstrain_model::Scalar;
 
-/// The reading compared with all predictions of it. Innovations are summed around the first of them: their spread shall not
-/// be the small difference of two squares of the distance to the reading.
+/// The reading compared with all its predictions. Innovations are summed relative to the first one, so that their spread is
+/// not a small difference of two squared distances to the reading.
 #[derive(Clone, Copy)]
 pub(crate) struct Predicted<T> {
     weight: T,
@@ -18,7 +18,7 @@ impl<T: Scalar> Predicted<T> {
         Self { weight: zero, around: zero, distance: zero, square: zero, variance: zero }
     }
 
-    /// One hypothesis of probability `weight`: its innovation, and the variance of that.
+    /// Adds a hypothesis of probability `weight`, with its innovation and innovation variance.
     #[inline(always)]
     pub(crate) fn add(&mut self, weight: T, innovation: T, variance: T) {
         if self.weight.is_zero() {
@@ -31,12 +31,12 @@ impl<T: Scalar> Predicted<T> {
         self.variance += weight * variance;
     }
 
-    /// Probability of all of them.
+    /// Returns the total probability.
     pub(crate) const fn weight(&self) -> &T {
         &self.weight
     }
 
-    /// Mean and variance of the innovation.
+    /// Returns mean and variance of the innovation.
     pub(crate) fn moments(&self) -> (T, T) {
         let mean = self.distance / self.weight;
         let spread = (self.square / self.weight - mean * mean).max(T::zero());
@@ -48,8 +48,8 @@ impl<T: Scalar> Predicted<T> {
 mod tests {
     use super::Predicted;
 
-    /// Mean `Σ w ν / Σ w` and variance `Σ w (S + ν²) / Σ w - mean²`, which is exact as far from the reading as here; and in
-    /// `f32` at a distance at which these squares leave nothing of the variance.
+    /// Mean `Σ w ν / Σ w` and variance `Σ w (S + ν²) / Σ w - mean²`, exact at this distance from the reading; and in `f32`
+    /// at a distance at which these squares lose the whole variance.
     #[test]
     fn the_innovation_of_a_mixture_has_its_moments() {
         let parts = [(0.2, 1.0, 0.5), (0.1, -2.0, 0.3), (0.4, 0.25, 0.7)];
@@ -64,7 +64,7 @@ mod tests {
         let mut far = Predicted::<f32>::new();
         far.add(0.5, 3e4, 1e-4);
         far.add(0.5, 3e4 + 0.25, 1e-4);
-        // A quarter is a multiple of rounding there: nothing is rounded.
+        // A quarter is a multiple of the rounding unit there, so nothing is rounded.
         assert_eq!(far.moments(), (30_000.125, 1e-4 + 0.015_625));
     }
 }

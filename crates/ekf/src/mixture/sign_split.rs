@@ -1,8 +1,8 @@
 //! The sign-split filter.
 //!
 //! # Policy
-//! As [`SparseEkf`](crate::SparseEkf): the state is changed in place, an error leaves it as it was, and nothing takes a
-//! logarithm unless asked or unless the strain is near a limit.
+//! As [`SparseEkf`](crate::SparseEkf): the state is changed in place, an error leaves it unchanged, and logarithms are
+//! computed only on request or if the strain is near a limit.
 
 use core::marker::PhantomData;
 
@@ -24,14 +24,14 @@ use crate::{
 
 /// Filter with at most `K` Gaussian hypotheses, split by the sign of the rate.
 ///
-/// Each predicted Gaussian is cut at rate zero. The masses of the halves are the probabilities of stretching and
-/// releasing, and each half drives the branches with its own gains. With a [`Dwell`] there is a hold phase besides,
-/// entered and left by the chain's probabilities; its moving phases turn around by crossing rate zero, not by the chain.
+/// Each predicted Gaussian is truncated at rate zero. The masses of the halves are the probabilities of stretching and
+/// releasing, and each half drives the branches with its own gains. With a [`Dwell`] there is also a hold phase, entered
+/// and left with the chain's probabilities; moving phases turn around by crossing rate zero, not by the chain.
 ///
-/// During a pause of the readings nothing is cut any more once the rate has forgotten its direction. A Gaussian whose tail is cut off
-/// and merged with the other half at every row would forget it sooner the more rows there are, and with it how far the body may have
-/// gone. Instead each hypothesis moves on with an uncertain direction, as that of an [`Ekf`](crate::Ekf) does, and the next
-/// reading splits it.
+/// In a pause of the readings, truncation stops once the rate has lost its direction. If a Gaussian were truncated and merged with
+/// the other half at every row, its direction, and so the distance that the body may have moved, would depend on the number of
+/// rows. Instead each hypothesis continues with an uncertain direction, like an [`Ekf`](crate::Ekf), and the next reading splits
+/// it.
 ///
 /// A truncated Gaussian-sum split. `G` as for [`SparseEkf`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,16 +41,16 @@ pub struct SignSplit<T, const B: usize, const N: usize, const K: usize, S = Comp
     /// Probabilities of a change of phase over a step, `[from][to]`; `None` for a body that never rests.
     pub(crate) chain: Option<[[T; 3]; 3]>,
     pub(crate) weighing: Weighing<T>,
-    /// Rate of a moving phase after a hold.
+    /// Initial rate of each phase after a hold.
     pub(crate) fresh: [Gaussian<T>; 3],
-    /// Seconds without a reading after which a step leaves the direction open.
+    /// Time without a reading, s, after which steps leave the direction open.
     pub(crate) forgets_direction_s: T,
 }
 
 impl<T: Real, const B: usize, const N: usize, const K: usize> SignSplit<T, B, N, K> {
     /// A filter for steps of `dt_s` seconds.
-    /// - `hold`: how long holds and movements last; `None` for a body that never rests.
-    /// - `evidence`: what weighs the hypotheses.
+    /// - `hold`: durations of holds and movements; `None` for a body that never rests.
+    /// - `evidence`: evidence that weighs the hypotheses.
     ///
     /// # Errors
     /// If `dt_s` is negative or not finite.
@@ -65,8 +65,8 @@ impl<T: Real, const B: usize, const N: usize, const K: usize> SignSplit<T, B, N,
 }
 
 impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: Curve<T>> SignSplit<T, B, N, K, S, G> {
-    /// A filter whose hypotheses step as `kernel` does; the other arguments as for [`Self::new`]. Of its switch only the
-    /// square root is used but in a pause, where the direction stays open.
+    /// Creates a filter whose hypotheses step like `kernel`; the other arguments are those of [`Self::new`]. Only the
+    /// square root of the kernel's switch is used, except in a pause, where the direction stays open.
     pub fn around(kernel: SparseEkf<T, S, B, N, G>, hold: Option<Dwell<T>>, evidence: Evidence<T>) -> Self {
         Self {
             hold,
@@ -126,7 +126,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
         if open { goes_on(self.chain.as_ref(), from) } else { follows(self.chain.as_ref(), from) }
     }
 
-    /// Nothing of what rested. What was left open has the phase of its rate.
+    /// Returns the excess path, zero after a hold. An open direction is that of the mean rate.
     #[inline(always)]
     fn turning<V: Several<Number = T>, X: Switch<V>>(
         &self,
@@ -183,7 +183,8 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
             if V::none(alive) {
                 return None;
             }
-            // After a hold the chain gives the probability of this direction; none of it goes to the other.
+            // After a hold, the chain alone gives the probability of this direction; the truncated mass does not reduce
+            // it.
             let given = V::both(begins, mass.literal(0.5).less(mass));
             prior = V::pick(given, prior, prior * mass);
         }
@@ -192,11 +193,11 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
     }
 }
 
-/// A cut that leaves less than this of a prediction is not followed: its moments would be those of a far tail.
+/// Smallest mass left by a truncation. Below it a child is dropped, because its moments would be those of a far tail.
 pub(crate) const LEAST_MASS: f64 = 1e-3;
 
-/// Returns the probabilities of the phases that follow `phase`, in the order of [`Phase::ALL`]. The cut at rate zero decides
-/// between stretching and releasing.
+/// Returns the probabilities of the phases that follow `phase`, in the order of [`Phase::ALL`]. The truncation at rate zero
+/// decides between stretching and releasing.
 fn follows<T: Real>(chain: Option<&[[T; 3]; 3]>, phase: Phase) -> [T; 3] {
     match (chain, phase) {
         (None, _) => [T::one(), T::zero(), T::one()],
@@ -205,7 +206,8 @@ fn follows<T: Real>(chain: Option<&[[T; 3]; 3]>, phase: Phase) -> [T; 3] {
     }
 }
 
-/// Returns the probabilities if the direction stays open: a movement goes on as one, until a reading splits it.
+/// Returns the probabilities if the direction stays open: a movement continues as one hypothesis until a reading splits
+/// it.
 fn goes_on<T: Real>(chain: Option<&[[T; 3]; 3]>, phase: Phase) -> [T; 3] {
     let (stops, zero) = (chain.map_or(T::zero(), |chain| chain[0][1]), T::zero());
     match (chain, phase) {

@@ -1,4 +1,4 @@
-//! The children of hypotheses that stand side by side: one hypothesis, or as many as a vector has lanes.
+//! The children of hypotheses side by side: one hypothesis, or one per lane of a vector.
 
 use core::marker::PhantomData;
 
@@ -14,26 +14,26 @@ use crate::mixture::predicted::Predicted;
 use crate::mixture::state::{Mixture, Share};
 use crate::{Compact, MixtureResidual, Reading, Residual, StepError, Switch};
 
-/// Hypotheses side by side, with what all their children share.
+/// Hypotheses side by side, with values shared by their children.
 pub(crate) struct Parents<V: Lanes> {
     pub weight: V,
-    /// One over the probability of the limits.
+    /// Inverse of the probability of the limits.
     pub per_inside: V,
     /// Lanes that hold a parent.
     pub there: V::Mask,
-    /// Lanes of the parents in each phase; then, for each phase, the probability that it follows.
+    /// Lanes of the parents in each phase; `follows` has the probability of each next phase.
     pub from: [V::Mask; 3],
     pub follows: [V; 3],
-    /// Open path of their rates over the step; `None` if there is no reading to tell their directions. Vectors handle no such
-    /// steps.
+    /// Excess path of their rates over the step; `None` if the direction is open in a pause, a step that vectors do not
+    /// handle.
     pub turning: Option<Turning<V>>,
 }
 
-/// Recorder of children on their way to the reading.
+/// Recorder of children before the reading.
 pub(crate) trait ChildTrace<V: Lanes, const B: usize> {
-    /// Records the starts: the parents' beliefs, with a new rate where a phase `begins`.
+    /// Records the initial beliefs: the parents', with a new rate where a phase `begins`.
     fn starts(&mut self, _from: &Parts<V, B>, _begins: V::Mask, _course: &Course<V>) {}
-    /// The prediction before it is cut.
+    /// Records the prediction before truncation.
     fn ahead(&mut self, _predicted: &Parts<V, B>) {}
 }
 
@@ -64,18 +64,18 @@ impl<T: Real, const B: usize> ChildTrace<T, B> for Option<ChildPath<T, B>> {
     }
 }
 
-/// A filter whose hypotheses have a child in each phase at most.
+/// A filter whose hypotheses have at most one child in each phase.
 pub(crate) trait Spawns<T: Real, const B: usize, const N: usize> {
-    /// Switch that splits uncertain rates, and takes roots, where numbers are stepped one by one.
+    /// Switch that splits uncertain rates, and takes roots, for scalars.
     type Switch: Switch<T>;
 
     fn weighing(&self) -> &Weighing<T>;
 
-    /// Probabilities of the phases that follow one; `open` if its direction is not used.
+    /// Returns the probabilities of the phases after one; `open` if its direction is not used.
     fn follows(&self, from: Phase, open: bool) -> [T; 3];
 
-    /// Returns the open path of hypotheses whose rates may turn around, for those `from` each phase; `was_open` if their directions were
-    /// not used in the step before.
+    /// Returns the excess path of hypotheses whose rates may turn around, with the lanes `from` each phase; `was_open` if their
+    /// directions were open in the previous step.
     fn turning<V: Several<Number = T>, X: Switch<V>>(
         &self,
         from: &[V::Mask; 3],
@@ -83,7 +83,7 @@ pub(crate) trait Spawns<T: Real, const B: usize, const N: usize> {
         was_open: bool,
     ) -> Turning<V>;
 
-    /// Makes the children of one phase of their parents' beliefs; `None` if there are none.
+    /// Turns parents' beliefs into their children of one phase; `None` if there are none.
     fn spawn<V: Several<Number = T>, X: Switch<V>>(
         &self,
         parts: &mut Parts<V, B>,
@@ -99,7 +99,7 @@ pub(crate) struct MixtureStep<'a, F, T, const B: usize, const N: usize, const L:
     pub filter: &'a F,
     pub state: &'a Mixture<T, N, L, K>,
     pub reading: Option<Reading<T>>,
-    /// Mixture that is filled with the children.
+    /// Mixture to be filled with the children.
     pub next: &'a mut Mixture<T, N, L, K>,
     /// True if directions stay open.
     pub open: bool,
@@ -116,7 +116,7 @@ impl<F: Spawns<T, B, N>, T: Real, const B: usize, const N: usize, const L: usize
     pub(crate) fn done(self, recorder: &mut impl Recorder<T, B>) -> StepResult<T> {
         let Self { filter, state, reading, next, open, branches } = self;
         if !records(recorder) && !open {
-            // What vectors refuse is looked at number by number, which tells why.
+            // A step that fails in vectors is repeated with scalars, which gives the reason.
             if let Some(Ok(residual)) =
                 T::in_vectors(MixtureStep { filter, state, reading, next: &mut *next, open, branches })
             {
@@ -197,7 +197,7 @@ impl<F: Spawns<T, B, N>, T: Real, const B: usize, const N: usize, const L: usize
         let (mut children, mut predicted) = (Children::new(next, state.room()), Predicted::new());
         let mut place = 0;
         while let Some(first) = state.at(place) {
-            // Lanes that are left have the first one's numbers.
+            // Unused lanes are filled with the first one's numbers.
             let mut of = [first; MOST_LANES];
             for lane in 1..V::WIDTH {
                 of[lane] = state.at(place + lane).unwrap_or(first);
@@ -231,7 +231,7 @@ impl<F: Spawns<T, B, N>, T: Real, const B: usize, const N: usize, const L: usize
     }
 }
 
-/// Returns the values that the children of hypotheses in the lanes of vectors share.
+/// Returns the values shared by the children of hypotheses in the lanes of vectors.
 #[inline(always)]
 fn side_by_side<F, V, const B: usize, const N: usize, const L: usize>(
     filter: &F,
@@ -254,7 +254,7 @@ where
     Parents { weight, per_inside, there, from, follows: [extend, hold, retract], turning }
 }
 
-/// Puts the child in a lane among the others.
+/// Adds the child in a lane to the others.
 #[inline(always)]
 fn collect<V, const B: usize, const N: usize, const L: usize, const K: usize>(
     children: &mut Children<'_, V::Number, N, L, K>,

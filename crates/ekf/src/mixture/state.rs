@@ -8,7 +8,7 @@ use crate::mixture::pause::{Pause, PhaseSum};
 use crate::mixture::{marginal_match, moment_match};
 use crate::{Belief, Gaussian, State};
 
-/// A Gaussian and its share of a mixture. Shares are probabilities, not logarithms: nothing is to be converted at a step.
+/// A Gaussian and its share of a mixture. Shares are probabilities, not logarithms, so that steps need no conversion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(
@@ -16,13 +16,13 @@ use crate::{Belief, Gaussian, State};
     serde(bound(serialize = "T: Scalar + serde::Serialize", deserialize = "T: Scalar + serde::Deserialize<'de>"))
 )]
 pub struct Share<T, const N: usize, const L: usize> {
-    /// Its probability; zero where nothing is followed.
+    /// Probability of the hypothesis; zero if it is not followed.
     pub weight: T,
     /// The state, given the hypothesis.
     pub belief: Belief<T, N, L>,
-    /// One over the probability of the strain's limits under `belief`. Only changes of the probability enter the weight:
-    /// evidence that was counted once is not counted again at every step of a rest on a limit. The weight times this is what
-    /// it would be without limits, so that a merged hypothesis has the mean of both.
+    /// Inverse of the probability of the strain's limits under `belief`. Only changes of that probability enter the weight,
+    /// so that evidence is not counted again at every step while the strain rests at a limit. The weight times this is the
+    /// weight without limits, so that merging averages it.
     pub(crate) per_inside: T,
 }
 
@@ -34,7 +34,7 @@ impl<T: Real, const N: usize, const L: usize> Share<T, N, L> {
     }
 }
 
-/// One Gaussian per phase: what [`Imm`](crate::Imm) carries from step to step.
+/// One Gaussian per phase, the state of [`Imm`](crate::Imm).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(
@@ -46,20 +46,20 @@ pub struct PhaseMixture<T, const N: usize, const L: usize> {
 }
 
 impl<T: Real, const N: usize, const L: usize> PhaseMixture<T, N, L> {
-    /// One phase that has all the weight.
+    /// Creates a state with all weight on one phase.
     #[must_use]
     pub fn single(belief: Belief<T, N, L>, phase: Phase) -> Self {
         let weight = |of| if of == phase { T::one() } else { T::zero() };
         Self { modes: Phase::ALL.map(|of| Share { weight: weight(of), belief, per_inside: T::one() }) }
     }
 
-    /// The Gaussians in the order of [`Phase::ALL`]; one without weight is not followed.
+    /// Returns the Gaussians in the order of [`Phase::ALL`]; one without weight is not followed.
     #[must_use]
     pub const fn modes(&self) -> &[Share<T, N, L>; 3] {
         &self.modes
     }
 
-    /// Probability of each phase, in the order of [`Phase::ALL`].
+    /// Returns the probability of each phase, in the order of [`Phase::ALL`].
     #[must_use]
     pub fn phase_probabilities(&self) -> [T; 3] {
         core::array::from_fn(|i| self.modes[i].weight)
@@ -78,21 +78,21 @@ impl<T: Real, const N: usize, const L: usize> PhaseMixture<T, N, L> {
         Self { modes: [Share::vacant(); 3] }
     }
 
-    /// A phase has one place.
+    /// Does nothing: each phase has only one place.
     const fn take_beside(&mut self, _other: &Self, _share: T) {}
 
-    /// Does nothing: there are three phases.
+    /// Does nothing: there are always three phases.
     const fn keep(&mut self, _most: usize) {}
 }
 
-/// Mixture of at most `K` Gaussians, each stretching, holding or releasing: the state that [`SignSplit`](crate::SignSplit) and
-/// [`Hypotheses`](crate::Hypotheses) carry from step to step.
+/// Mixture of at most `K` Gaussians, each stretching, holding or releasing: the state of [`SignSplit`](crate::SignSplit) and
+/// [`Hypotheses`](crate::Hypotheses).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mixture<T, const N: usize, const L: usize, const K: usize> {
     shares: [Share<T, N, L>; K],
     phases: [Phase; K],
     len: usize,
-    /// Most hypotheses that steps keep, at most `K`.
+    /// Maximum number of hypotheses that steps keep, at most `K`.
     room: usize,
     pause: Pause<T>,
 }
@@ -100,7 +100,7 @@ pub struct Mixture<T, const N: usize, const L: usize, const K: usize> {
 impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K> {
     const CAPACITY: () = assert!(K >= 1 && N >= 2, "a mixture holds at least one hypothesis of strain and rate");
 
-    /// One Gaussian that has all the weight.
+    /// Creates a mixture of one Gaussian with all the weight.
     #[must_use]
     pub fn single(belief: Belief<T, N, L>, phase: Phase) -> Self {
         let () = Self::CAPACITY;
@@ -121,14 +121,14 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K
         self.pause = pause;
     }
 
-    /// One place more, if there is room.
+    /// Adds a place, if there is room.
     pub(crate) fn one_more(&mut self) -> Option<(&mut Share<T, N, L>, &mut Phase)> {
         let (share, phase) = (self.shares.get_mut(self.len)?, self.phases.get_mut(self.len)?);
         self.len += 1;
         Some((share, phase))
     }
 
-    /// Drops those that do not count; the others keep their order.
+    /// Drops the hypotheses for which `counts` is false; the others keep their order.
     pub(crate) fn retain(&mut self, counts: impl Fn(&Share<T, N, L>) -> bool) {
         let mut kept = 0;
         for place in 0..self.len {
@@ -146,18 +146,18 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K
         self.len = kept;
     }
 
-    /// Follows nothing, with room for so many.
+    /// Removes all hypotheses, and sets the room for new ones.
     pub(crate) fn clear(&mut self, room: usize) {
         (self.len, self.room, self.pause) = (0, room.min(K), Pause::over());
     }
 
-    /// Sets what a state that was stored had besides its hypotheses.
+    /// Restores the parts of a stored state besides its hypotheses.
     #[cfg(feature = "serde")]
     pub(crate) fn restore(&mut self, room: usize, pause: Pause<T>) {
         (self.room, self.pause) = (room, pause);
     }
 
-    /// Most hypotheses that steps keep.
+    /// Returns the maximum number of hypotheses that steps keep.
     pub(crate) const fn room(&self) -> usize {
         self.room
     }
@@ -185,7 +185,7 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K
         self.phases.get(..self.len).unwrap_or(&[])
     }
 
-    /// Probability of each phase, in the order of [`Phase::ALL`].
+    /// Returns the probability of each phase, in the order of [`Phase::ALL`].
     #[must_use]
     pub fn phase_probabilities(&self) -> [T; 3] {
         let mut probabilities = PhaseSum::new(self.pause.open);
@@ -199,12 +199,12 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K
         self.shares.get_mut(..self.len).unwrap_or(&mut [])
     }
 
-    /// Keeps no more from the next step on.
+    /// Limits the number of hypotheses from the next step on.
     fn keep(&mut self, most: usize) {
         self.room = most.clamp(1, K);
     }
 
-    /// Follows the first Gaussian of another mixture, too, in place of the lightest if there is no other.
+    /// Adds the first Gaussian of another mixture, in place of the lightest if there is no free place.
     fn take_beside(&mut self, other: &Self, share: T) {
         let Some((beside, phase)) = other.at(0) else { return };
         let weights = self.shares().iter().map(|share| share.weight).enumerate();

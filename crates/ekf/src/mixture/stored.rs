@@ -1,4 +1,4 @@
-//! A [`Mixture`] as plain data: the hypotheses that it follows, and no empty places.
+//! A [`Mixture`] as plain data: its hypotheses, without empty places.
 
 use core::fmt;
 use core::marker::PhantomData;

@@ -29,7 +29,7 @@ fn one() -> impl Strategy<Value = One> {
     })
 }
 
-/// Total weight, mean and covariance by first and second moments about zero.
+/// Returns total weight, mean and covariance from first and second moments about zero.
 fn naive_moments(all: &[One]) -> (f64, SVector<f64, 3>, SMatrix<f64, 3, 3>) {
     let (mut total, mut first, mut second) = (0.0, SVector::zeros(), SMatrix::zeros());
     for (weight, belief) in all {
@@ -53,12 +53,12 @@ fn kept(mixture: &Mixture<f64, 3, 6, 2>) -> Vec<One> {
     mixture.shares().iter().map(|Share { weight, belief, .. }| (*weight, *belief)).collect()
 }
 
-/// Some thirty rounded sums and products of numbers of at most ten.
+/// About thirty rounded sums and products of numbers up to ten.
 const ROUNDING: f64 = 1e-13;
 
 proptest! {
-    /// Merging of hypotheses that are like the first: however many are added, one of that phase is left, and the
-    /// mixture's moments and phase probabilities stay.
+    /// Merges hypotheses similar to the first: however many are added, one of that phase remains, and the mixture's
+    /// moments and phase probabilities are preserved.
     #[test]
     fn merging_preserves_weight_mean_and_covariance(
         first in one(), others in prop::collection::vec(one(), 1..6), apart in one(),
@@ -88,7 +88,8 @@ proptest! {
         prop_assert!((mixture.phase_probabilities()[1] - apart.0 / total).abs() < ROUNDING);
     }
 
-    /// Both halves of a belief, weighted with their masses, are the belief. Differences of erfc lose some digits.
+    /// The mixture of both halves of a truncated belief, weighted with their masses, is the belief. Differences of erfc
+    /// lose some digits.
     #[test]
     fn halves_of_a_cut_belief_make_the_whole((_, whole) in one()) {
         let halves = [Phase::Extend, Phase::Retract].map(|phase| {
@@ -99,13 +100,13 @@ proptest! {
         });
         let (total, mean, covariance) = naive_moments(&halves);
         prop_assert!((total - 1.0).abs() < ROUNDING);
-        // Far out, the moments of the smaller half are asymptotes, of mass 1e-8 and less.
+        // Far out, the moments of the smaller half are asymptotic, with masses of 1e-8 and less.
         prop_assert!((mean - whole.mean).amax() < 1e-7);
         prop_assert!((covariance - whole.covariance.to_matrix()).amax() < 1e-7);
     }
 }
 
-/// Weights of which no single one need be a number, in any order: `wᵢ exp(xᵢ)` over their sum.
+/// Weights `wᵢ exp(xᵢ)` over their sum, in any order; a single one need not be representable.
 #[test]
 fn no_single_weight_need_be_a_number() {
     let parts = [(0.2, 0.0), (0.5, -1.0), (0.3, 2.0)];
@@ -129,8 +130,8 @@ fn no_single_weight_need_be_a_number() {
     }
 }
 
-/// A mixture that is full merges its lightest hypothesis with the nearest, in units of the wider of the two: here with the
-/// one that is wide already because it has been merged.
+/// A full mixture merges its lightest hypothesis with the nearest, in units of the wider of the two: here with the one
+/// that is already wide from an earlier merge.
 #[test]
 fn the_lightest_makes_room() {
     let mut mixture = Mixture::<f64, 3, 6, 2>::empty();
@@ -145,7 +146,7 @@ fn the_lightest_makes_room() {
     assert!((strains[0] - merged).abs() < 1e-15 && strains[1] == 0.3, "{strains:?}");
 }
 
-/// Two exactly known strains that differ are different in every unit.
+/// Two exactly known strains that differ are not alike in any unit.
 #[test]
 fn exactly_known_states_are_alike_only_if_they_are_equal() {
     for unit in [1e-9, 1.0, 1e9] {
@@ -159,8 +160,7 @@ fn exactly_known_states_are_alike_only_if_they_are_equal() {
     }
 }
 
-/// Hypotheses on a limit that are merged, and found to be far inside later: what the limits had taken from each is given
-/// back.
+/// Merges hypotheses at a limit that are later found far inside: each regains the weight that the limits had taken.
 #[test]
 fn what_limits_took_is_given_back_after_merging() {
     let limits = StrainRange { lower: 0.0, upper: 1.0 };
@@ -223,8 +223,8 @@ fn weights(state: &State) -> Vec<f64> {
     state.shares().iter().map(|share| share.weight).collect()
 }
 
-/// Two hypotheses whose weights differ by less than the margin within which none is the lighter one: the children that came
-/// first are kept, those of the heavier are merged with the nearest. The strain is then set to that of the first, so it
+/// Two hypotheses have weights within the margin in which neither counts as lighter. The children that came first are kept,
+/// those of the heavier one are merged with the nearest. After the step the strain is known to be that of the first, so it
 /// was that before.
 #[test]
 fn a_smoother_goes_back_along_what_ran_forward_at_a_tie() {
@@ -241,7 +241,7 @@ fn a_smoother_goes_back_along_what_ran_forward_at_a_tie() {
     assert!((back.shares()[1].belief.mean[0] + 0.5).abs() < 0.01);
 }
 
-/// Negligible hypotheses are dropped after a step, and the places of the others move up: of two, the second is followed.
+/// Negligible hypotheses are dropped after a step, and the others move up: of two, the smoother follows the second.
 #[test]
 fn what_moves_up_is_followed() {
     let state = of(&[1e-8, 1.0]);
@@ -256,8 +256,8 @@ fn what_moves_up_is_followed() {
 }
 
 /// A step without new information changes no weight, by the law of total probability. Without a reading nothing is lost: a
-/// hypothesis that there is no room for is merged with the nearest, whether it was displaced (the last is the heavier) or came too
-/// late (the last is the lighter).
+/// hypothesis without room is merged with the nearest, whether it was displaced (the last is the heavier) or came too late (the
+/// last is the lighter).
 #[test]
 fn what_was_merged_is_followed() {
     for filtered in [[0.997, 1e-3, 2e-3], [0.997, 2e-3, 1e-3]] {
@@ -270,12 +270,12 @@ fn what_was_merged_is_followed() {
     }
 }
 
-/// Recorder that makes the filter step every child by itself.
+/// Recorder that forces the filter to step every child separately.
 struct Listener;
 
 impl super::lineage::Recorder<f64, 2> for Listener {}
 
-/// A body that goes to and fro with rests, near both limits; now and then without a reading, or with a wild one.
+/// A body that moves to and fro with rests, near both limits; some readings are missing or outliers.
 fn heard(k: usize) -> Option<Reading<f64>> {
     let t = k as f64;
     let slow = 0.22 + 0.24 * (t * 0.01).sin().clamp(-0.8, 0.8);
@@ -294,7 +294,7 @@ fn in_vectors_and_one_by_one<F: Spawns<f64, 2, 5>>(filter: &F, start: &Belief<f6
             if listens { step.done(&mut Listener) } else { step.done(&mut ()) }
         };
         assert_eq!(step(&mut together, false), step(&mut alone, true), "row {k}");
-        // Places that are not in use keep what was there before.
+        // Unused places keep their previous content.
         assert_eq!((together.shares(), together.phases()), (alone.shares(), alone.phases()), "row {k}");
         state = alone;
         most = most.max(state.shares().len());
@@ -302,8 +302,8 @@ fn in_vectors_and_one_by_one<F: Spawns<f64, 2, 5>>(filter: &F, start: &Belief<f6
     most
 }
 
-/// Vectors give the same result as numbers one by one, to the last bit: no result may depend on the processor's
-/// vectors, or on a recorder. On a processor without vectors the test shows nothing.
+/// Vectors give the same result as scalars, to the last bit: no result may depend on the processor's vectors, or on a
+/// recorder. On a processor without vectors the test has no effect.
 #[test]
 fn vectors_give_the_bits_of_numbers() {
     let branch = |tau_s, slope| Branch {
@@ -336,7 +336,7 @@ fn vectors_give_the_bits_of_numbers() {
     }
 }
 
-/// One that is followed, too, gets the free place or that of the lightest, and its share; the others keep theirs to each other.
+/// An added state gets the free place, or that of the lightest, with its share; the ratios of the others are preserved.
 #[test]
 fn what_is_followed_too_has_its_share_and_the_others_keep_theirs() {
     let belief = |strain: f64| Belief::<f64, 3, 6>::independent(vector![strain, 0.0, 0.0], &[1e-4; 3]);
@@ -350,7 +350,7 @@ fn what_is_followed_too_has_its_share_and_the_others_keep_theirs() {
         let phases = mixture.phases().iter();
         mixture.shares().iter().zip(phases).map(|(share, phase)| (share.belief.mean[0], share.weight, *phase)).collect()
     };
-    // No place is free: the lighter one goes.
+    // No place is free: the lighter one is dropped.
     assert_eq!(said(&mixture.beside(&other, 0.25)), [(0.5, 0.25, Phase::Hold), (0.9, 0.75, Phase::Extend)]);
     let alone = Mixture::<f64, 3, 6, 2>::single(belief(0.1), Phase::Extend);
     assert_eq!(said(&alone.beside(&other, 0.25)), [(0.1, 0.75, Phase::Extend), (0.5, 0.25, Phase::Hold)]);

@@ -7,10 +7,11 @@ use ohmstrain_model::{Number, StrainRange};
 use std::format;
 use std::vec::Vec;
 
-/// Functions around the sums of a filter's correction over its rows. The names of inputs and results are those of the arguments.
+/// Functions around the sums over rows in a filter's correction. Inputs and results have the names of the arguments.
 impl Correction<'_, f32, FILTER_INPUTS> {
-    /// Records the scaled inputs. From inputs `x` on the scale of the rows, and squares of the distance of each outside their range: the
-    /// distances `outside_direct` and `outside_residual`, and the processes' predictions before any row, `direct` and `residual`.
+    /// Records the part before the rows. From inputs `x` on the scale of the rows, and their squared distances outside the range,
+    /// it computes the distances `outside_direct` and `outside_residual`, and the processes' predictions without rows, `direct` and
+    /// `residual`.
     #[must_use]
     pub fn write_inputs(&self, quadratics: Option<&[Quadratic<'_, f32>; 2]>) -> Function {
         write_down(|writer| {
@@ -26,7 +27,7 @@ impl Correction<'_, f32, FILTER_INPUTS> {
         })
     }
 
-    /// The kernels of `x` with a `row`, `of_direct` and `of_residual`.
+    /// Records the kernels of `x` with a `row`: `of_direct` and `of_residual`.
     #[must_use]
     pub fn write_kernels(&self) -> Function {
         write_down(|writer| {
@@ -37,7 +38,7 @@ impl Correction<'_, f32, FILTER_INPUTS> {
         })
     }
 
-    /// Records the distance from the range of the simulated rows, given the square of each feature's distance.
+    /// Records the distance from the range of the simulated rows, given the squared distance of each feature.
     #[must_use]
     pub fn write_simulated_distance(&self, of: &Simulated<'_, f32, FILTER_INPUTS>) -> Function {
         write_down(|writer| {
@@ -46,7 +47,7 @@ impl Correction<'_, f32, FILTER_INPUTS> {
         })
     }
 
-    /// The kernel of `x` with a simulated `row`.
+    /// Records the kernel of `x` with a simulated `row`.
     #[must_use]
     pub fn write_simulated_kernel(&self, of: &Simulated<'_, f32, FILTER_INPUTS>) -> Function {
         write_down(|writer| {
@@ -105,7 +106,7 @@ impl Correction<'_, f32, FILTER_INPUTS> {
         })
     }
 
-    /// Its numbers without rows.
+    /// Returns the correction's numbers without rows.
     fn numbers<'t>(&self) -> Correction<'t, Expression<'t>, FILTER_INPUTS> {
         let [lower, upper] = [self.limits.lower, self.limits.upper].map(constant);
         Correction {
@@ -122,7 +123,8 @@ impl Correction<'_, f32, FILTER_INPUTS> {
     }
 }
 
-/// An `input` on a scale (`mean`, `sd`, `lower`, `upper`), `x`, and the `square` of how far it was outside of the range.
+/// Records the scaling of an `input` (`mean`, `sd`, `lower`, `upper`): `x`, and the `square` of its distance outside the
+/// range.
 #[must_use]
 pub fn write_scaled() -> Function {
     write_down(|writer| {
@@ -133,7 +135,7 @@ pub fn write_scaled() -> Function {
     })
 }
 
-/// The mixture of two members, `mean_a`, `variance_a`, `mean_b` and `variance_b`: `mean` and `variance`.
+/// Records the mixture of two members, `mean_a`, `variance_a`, `mean_b` and `variance_b`: `mean` and `variance`.
 #[must_use]
 pub fn write_mixture() -> Function {
     write_down(|writer| {
@@ -143,7 +145,7 @@ pub fn write_mixture() -> Function {
     })
 }
 
-/// Scales that are not used.
+/// Unused scales.
 const UNSCALED: [InputScale<Expression<'static>>; FILTER_INPUTS] = {
     let none = Expression::ZERO;
     [InputScale { mean: none, sd: none, lower: none, upper: none }; FILTER_INPUTS]
@@ -153,7 +155,7 @@ fn constant<'t>(number: f32) -> Expression<'t> {
     Number::of(number.into())
 }
 
-/// Its numbers without rows.
+/// Returns a process' numbers without rows.
 fn process<'t>(of: &Process<'_, f32, FILTER_INPUTS>) -> Process<'t, Expression<'t>, FILTER_INPUTS> {
     Process {
         relevance: of.relevance.map(constant),
@@ -172,14 +174,14 @@ fn value<'t>(of: &Quadratic<'_, f32>, x: &[Expression<'t>]) -> Expression<'t> {
     Quadratic { linear: &linear, square: &square }.value(x)
 }
 
-/// Returns inputs from a first one on, handed over as a list; those before it are not used.
+/// Returns inputs from a first one on, passed as a list; those before it are unused.
 fn inputs_from<'t>(writer: &Writer<'t>, first: usize, name: &str) -> [Expression<'t>; FILTER_INPUTS] {
     core::array::from_fn(|i| {
         i.checked_sub(first).map_or(Expression::ZERO, |place| writer.input(&format!("{name}[{place}]")))
     })
 }
 
-/// The squares of how far `x` is from a `row` in each input, and both.
+/// Returns the squared distances of `x` from a `row` in each input, and both lists.
 fn apart<'t>(
     writer: &Writer<'t>,
     first: usize,

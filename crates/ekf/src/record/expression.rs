@@ -9,23 +9,23 @@ use crate::Recordable;
 use crate::kernel::tail::Tail;
 use crate::kernel::{Falls, Lanes};
 
-/// A number that is known when the recorded function runs, or one of the source text.
+/// A number known only when the recorded function runs, or a literal of the source text.
 #[derive(Clone, Copy)]
 pub struct Expression<'a>(pub(super) Kind<'a>);
 
 #[derive(Clone, Copy)]
 pub(super) enum Kind<'a> {
-    /// A literal, on no tape yet.
+    /// A literal, not on a tape yet.
     Literal(f32),
     On(&'a Tape, Place),
 }
 
-/// Numbers that are none have room for the number of an input that they stand for.
+/// NaNs have room for the index of the input for which they stand.
 const NO_NUMBER: u32 = 0x7fc0_0000;
 const ROOM: u32 = 0x003f_ffff;
 
-/// A number that stands for an input wherever the kernel takes it for a constant. The kernel computes with constants in lanes
-/// only, which the tests of every piece would show.
+/// Returns a NaN that stands for an input where the kernel expects a constant. The kernel computes with constants only in
+/// lanes; the tests of every piece would reveal otherwise.
 pub(super) fn standing_for(input: usize) -> f32 {
     f32::from_bits(NO_NUMBER | (input as u32 & ROOM))
 }
@@ -39,12 +39,12 @@ impl Tape {
         self.put(Operation::Input(number))
     }
 
-    /// The operation, where its place is.
+    /// Records the operation, and returns its place as an expression.
     pub(super) fn put(&self, operation: Operation) -> Expression<'_> {
         Expression(Kind::On(self, self.place(operation)))
     }
 
-    /// A truth.
+    /// Records a known truth value.
     pub(super) fn known(&self, truth: bool) -> Expression<'_> {
         self.put(Operation::Known(truth))
     }
@@ -58,7 +58,7 @@ impl Tape {
 impl<'a> Expression<'a> {
     pub(super) const ZERO: Self = Self(Kind::Literal(0.0));
 
-    /// An operation of this number, on its tape.
+    /// Applies an operation to this number, on its tape.
     fn then(self, done: impl Fn(f32) -> f32, operation: impl Fn(Place) -> Operation) -> Self {
         match self.0 {
             Kind::Literal(number) => Self(Kind::Literal(done(number))),
@@ -66,7 +66,7 @@ impl<'a> Expression<'a> {
         }
     }
 
-    /// Records the operation; that of a constant, too.
+    /// Records the operation, even on a constant.
     fn noted(self, operation: impl Fn(Place) -> Operation) -> Self {
         self.then(|_| f32::NAN, operation)
     }
@@ -93,7 +93,7 @@ impl<'a> Expression<'a> {
         if let Operation::Known(truth) = self.operation() { Some(truth) } else { None }
     }
 
-    /// The tape of one of both, if any.
+    /// Returns the tape of either expression, if any.
     fn tape(self, other: Self) -> Option<&'a Tape> {
         match (self.0, other.0) {
             (Kind::On(tape, _), _) | (_, Kind::On(tape, _)) => Some(tape),
@@ -101,7 +101,7 @@ impl<'a> Expression<'a> {
         }
     }
 
-    /// An operation on two numbers, done at once if both are known.
+    /// Applies an operation to two numbers, immediately if both are constants.
     fn on(self, other: Self, done: fn(f32, f32) -> f32, operation: fn(Place, Place) -> Operation) -> Self {
         let known = self.constant().zip(other.constant()).map(|(a, b)| done(a, b));
         match (self.tape(other), known) {
@@ -111,7 +111,7 @@ impl<'a> Expression<'a> {
         }
     }
 
-    /// Chooses the other one where a mask is set; for literals the result is `done`.
+    /// Selects the other number where a mask is set; for literals the result is `done`.
     fn either_of(self, other: Self, done: fn(f32, f32) -> f32, mask: Self) -> Self {
         match (self.0, other.0) {
             (Kind::Literal(a), Kind::Literal(b)) => Self(Kind::Literal(done(a, b))),
@@ -119,7 +119,7 @@ impl<'a> Expression<'a> {
         }
     }
 
-    /// Returns the truth of a comparison on the way that is recorded.
+    /// Returns the result of a comparison on the path being recorded.
     fn ask(self, other: Self, done: fn(f32, f32) -> bool, operation: fn(Place, Place) -> Operation) -> bool {
         match (self.constant().zip(other.constant()), self.tape(other)) {
             (Some((a, b)), _) => done(a, b),
@@ -149,7 +149,7 @@ operation!(Sub sub, SubAssign sub_assign, Subtract);
 
 impl Mul for Expression<'_> {
     type Output = Self;
-    /// Ones are left out.
+    /// Multiplies; factors of one are omitted.
     fn mul(self, other: Self) -> Self {
         match (self.constant(), other.constant()) {
             (None, Some(1.0)) => self,
@@ -188,7 +188,7 @@ impl PartialEq for Expression<'_> {
     }
 }
 
-/// Each comparison is a question, whose answer is the way that is recorded.
+/// Compares by a question, whose answer selects the recorded path.
 impl PartialOrd for Expression<'_> {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         let (less, more) = (self < other, self > other);
@@ -295,7 +295,7 @@ impl Lanes for Expression<'_> {
         match (self.tape(other), self.constant().zip(other.constant())) {
             (Some(tape), Some((a, b))) => tape.known(a < b),
             (Some(tape), None) => tape.put(Operation::Less(self.place_on(tape), other.place_on(tape))),
-            // Literals alone are compared at once.
+            // Literals are compared immediately.
             (None, _) => self,
         }
     }
@@ -369,12 +369,12 @@ impl Falls for Expression<'_> {
         self.noted(Operation::ToExponent)
     }
 
-    /// A function of its own.
+    /// Records a separate function.
     fn falling(self) -> Self {
         self.then(Falls::falling, Operation::Falling)
     }
 
-    /// A function of its own.
+    /// Records a separate function.
     fn tail(self, _: Self) -> Tail<Self> {
         let mass = self.noted(Operation::Tail);
         Tail { mass, hazard: mass.noted(Operation::Hazard) }

@@ -1,22 +1,22 @@
 use crate::correction::ReadingFeatures;
 use crate::live::{Doubts, Jumps, Repeats, RestFollower};
 
-/// Fields of a state, by name: the numbers that another language keeps from step to step.
+/// Fields of a state, by name: the numbers that a program in another language keeps from step to step.
 pub trait Fields<T> {
-    /// Shows all fields.
+    /// Passes all fields to the visitor.
     fn each(&mut self, see: &mut impl See<T>);
 }
 
 /// Visitor of the fields of a state, which may change them.
 pub trait See<T> {
-    /// A number.
+    /// Visits a number.
     fn number(&mut self, name: &'static str, number: &mut T);
-    /// A truth.
+    /// Visits a truth value.
     fn truth(&mut self, name: &'static str, truth: &mut bool);
-    /// Numbers that may be missing.
+    /// Visits numbers that may be missing.
     fn maybe<const K: usize>(&mut self, name: &'static str, numbers: &mut Option<[T; K]>);
 
-    /// A number that may be missing.
+    /// Visits a number that may be missing.
     fn maybe_one(&mut self, name: &'static str, number: &mut Option<T>)
     where
         T: Copy,
@@ -26,11 +26,11 @@ pub trait See<T> {
         *number = numbers.map(|[number]| number);
     }
 
-    /// Shows a list of numbers of fixed length.
+    /// Visits a list of numbers of fixed length.
     fn numbers<const K: usize>(&mut self, name: &'static str, numbers: &mut [T; K]);
 }
 
-/// Writes down the fields of states as they are named there.
+/// Implements [`Fields`] for states, with their field names.
 macro_rules! fields {
     ($($state:ident { $($kind:ident $name:literal $($field:ident).+),+ $(,)? })+) => {
         $(impl<T: Copy> Fields<T> for $state<T> {

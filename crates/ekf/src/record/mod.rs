@@ -1,9 +1,9 @@
-//! Recording of the kernel's arithmetic, for programs that write other programs.
+//! Recording of the kernel's arithmetic, for programs that generate source code.
 //!
-//! A tape runs the kernel on expressions and keeps every operation, in the order in which the kernel does them. Where
-//! numbers would choose a way, both ways are kept and one of the results is chosen; results are the same.
+//! The kernel runs on expressions, and a tape stores every operation in the kernel's order. Where numbers would select
+//! a branch, both branches are recorded and one of their results is selected; the results are the same.
 //!
-//! Code around the kernel compares numbers and goes one way ([`write_down`]): it is run once for every way that it may go.
+//! Code around the kernel compares numbers and takes one path ([`write_down`]); it is run once for every possible path.
 
 mod correction;
 mod expression;

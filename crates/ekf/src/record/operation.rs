@@ -6,9 +6,9 @@ pub type Place = usize;
 /// An operation on earlier results. Sums, products and quotients are rounded one by one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Operation {
-    /// The input of this number.
+    /// The input with this index, a number.
     Input(usize),
-    /// The input of this number, a truth.
+    /// The input with this index, a truth value.
     Flag(usize),
     /// A constant.
     Constant(f32),
@@ -20,7 +20,7 @@ pub enum Operation {
     Multiply(Place, Place),
     /// A quotient.
     Divide(Place, Place),
-    /// The number with its sign turned.
+    /// The number with its sign changed.
     Negate(Place),
     /// The number without its sign.
     Absolute(Place),
@@ -28,21 +28,21 @@ pub enum Operation {
     Root(Place),
     /// An exponential.
     Exponential(Place),
-    /// An exponential, less one.
+    /// An exponential minus one.
     ExponentialLessOne(Place),
     /// A hyperbolic tangent.
     Tangent(Place),
-    /// An exponential of what is not above zero.
+    /// An exponential of a number up to zero.
     Falling(Place),
-    /// The number with its bits shifted to where an exponent stands.
+    /// The number with its bits shifted into the exponent.
     ToExponent(Place),
     /// Upper tail of a standard normal above a border.
     Tail(Place),
-    /// Its density at the border of such a tail, over the tail.
+    /// Density at the border of such a tail, divided by the tail.
     Hazard(Place),
     /// True if the first is less than the second.
     Less(Place, Place),
-    /// True if the first is not more than the second.
+    /// True if the first is at most the second.
     AtMost(Place, Place),
     /// True if both are the same number.
     Equal(Place, Place),
@@ -54,11 +54,11 @@ pub enum Operation {
     Both(Place, Place),
     /// True if either is true.
     Either(Place, Place),
-    /// True if it is false.
+    /// True if the operand is false.
     Not(Place),
     /// A known truth value.
     Known(bool),
-    /// The second where the first is true, else the third.
+    /// The second operand if the first is true, otherwise the third.
     Pick(Place, Place, Place),
 }
 
@@ -81,7 +81,7 @@ impl Operation {
         )
     }
 
-    /// The places of what it takes.
+    /// Returns the places of its operands.
     pub fn operands(self) -> impl Iterator<Item = Place> {
         let (a, b, c) = match self {
             Self::Input(_) | Self::Flag(_) | Self::Constant(_) | Self::Known(_) => (None, None, None),
@@ -113,7 +113,7 @@ impl Operation {
     }
 }
 
-/// A function from inputs to results without a choice of way.
+/// A function from inputs to results without branches.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recorded {
     /// Operations, each on results of earlier ones.

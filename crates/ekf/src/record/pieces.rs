@@ -10,47 +10,48 @@ use crate::mixture::evidence::Weighing;
 use crate::mixture::pair::{About, merge};
 use crate::{Compact, Curve, Gaussian, Reading, SparseEkf};
 
-/// A part of a step that goes from one end to the other without asking which way.
+/// A part of a step without branches.
 ///
-/// The first inputs are the state's means, then the lower triangle of its covariance row by row, then those that stand with each piece
-/// ([`Piece::inputs`]), then what depends on the length of the step ([`SparseEkf::step_names`]). A *side* is that of zero on
-/// which a moving phase has its rates: 1 or -1.
+/// Its inputs are the state's means, the lower triangle of the covariance row by row, the piece's own inputs ([`Piece::inputs`]),
+/// and the numbers that depend on the step's length ([`SparseEkf::step_names`]). A *side* is the side of zero, 1 or -1, of a moving
+/// phase's rates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Piece {
-    /// The prediction of a hypothesis: out comes the state.
+    /// Prediction of a hypothesis. Result: the state.
     Predict(Phase),
-    /// The same where the rate may have turned around on the way, which adds an excess (input) of path with a variance
+    /// The same if the rate may have turned around within the step, which adds an excess path (input) with a variance
     /// (input).
     PredictTurning(Phase),
-    /// The prediction with an uncertain direction.
+    /// Prediction with an uncertain direction. Result: the state.
     PredictOpen,
-    /// The update with a reading (input) that has so much extra variance (input): out come the state, the innovation, its
-    /// variance, the normalised innovation squared, and whether all of it is sound. With no phase the rate is split.
+    /// Update with a reading (input) and its extra variance (input). Results: the state, the innovation, its variance,
+    /// the normalised innovation squared, and true if all of these are valid. Without a phase the rate is split.
     Take(Option<Phase>),
-    /// Check that a state is sound. The state stays.
+    /// Check that a state is valid; the state is unchanged.
     Sound,
-    /// New rate, of a mean (input) and a variance (input): out comes the state.
+    /// New rate with a mean (input) and a variance (input). Result: the state.
     Renew,
-    /// Path beyond the net move that a rate on a side (input) may add by turning around: the excess, and its variance.
+    /// Path beyond the net displacement of a rate on a side (input) that may turn around. Results: the excess, and its
+    /// variance.
     Turns,
-    /// True if next to no probability of a moving phase's prediction is on its side (input).
+    /// True if almost none of the probability of a moving phase's prediction is on its side (input).
     Hopeless,
-    /// Probability of a side (input) for a rate that is certain to be there or not, and whether a cut is needed.
+    /// Probability of a side (input) if no truncation is needed, and true if one is.
     CertainOfSide,
-    /// The state restricted to rates of a side (input), and what that leaves of it.
+    /// The state truncated to rates on a side (input), and the remaining probability.
     CutOff,
-    /// The limits' probability over what the first input is one over, and one over the probability; of a lower and an upper limit
+    /// Probability of the limits times the first input, and the inverse of that probability, for a lower and an upper limit
     /// (inputs).
     OfLimits,
-    /// The exponential of an exponent (input) that is not above zero.
+    /// The exponential of an exponent (input) up to zero.
     Falling,
-    /// The density of a standard normal at a border (input) over what it has above, and that.
+    /// The density of a standard normal at a border (input) divided by its upper tail, and that tail.
     Tail,
     /// True if another state (inputs) is alike.
     Alike,
     /// The squared distance of another state (inputs) in strain and rate.
     Distance,
-    /// The mean and covariance of this state and another one (inputs), of which the pair has two shares (inputs).
+    /// The mean and covariance of the pair of this state and another one (inputs), with their shares (inputs).
     Merge,
 }
 
@@ -86,7 +87,7 @@ struct Inputs<'a, 't> {
 }
 
 impl<'t> Inputs<'_, 't> {
-    /// Returns the input of this number; a piece that has fewer does not ask for it.
+    /// Returns the input with this index; a piece with fewer inputs does not use it.
     fn at(&self, number: usize) -> Expression<'t> {
         self.more.get(number).copied().unwrap_or_else(|| self.tape.input(0).literal(0.0))
     }
@@ -99,7 +100,7 @@ impl<const B: usize, const N: usize, G: Curve<f32>> SparseEkf<f32, Compact, B, N
         Carried { means: N, covariances: N * (N + 1) / 2 }
     }
 
-    /// Writes down what the filter does, with the numbers of this sensor as constants.
+    /// Records a piece of the filter, with the numbers of this sensor as constants.
     #[must_use]
     pub fn record(&self, piece: Piece) -> Recorded {
         let carried = Self::carried();
@@ -111,7 +112,7 @@ impl<const B: usize, const N: usize, G: Curve<f32>> SparseEkf<f32, Compact, B, N
         open.write_down(piece)
     }
 
-    /// Records a piece with numbers that stand for inputs.
+    /// Records a piece with placeholders for inputs.
     fn write_down(&self, piece: Piece) -> Recorded {
         let tape = Tape::default();
         let carried = Self::carried();
@@ -124,7 +125,7 @@ impl<const B: usize, const N: usize, G: Curve<f32>> SparseEkf<f32, Compact, B, N
         tape.recorded(changed.into_iter().chain(results))
     }
 
-    /// Computes the results of a piece besides the state, which it changes.
+    /// Computes the results of a piece besides the state, which is changed in place.
     fn results_of<'t>(
         &self,
         piece: Piece,
@@ -183,7 +184,7 @@ impl<const B: usize, const N: usize, G: Curve<f32>> SparseEkf<f32, Compact, B, N
         results
     }
 
-    /// A state of the numbers with which a list begins.
+    /// Returns the state from the first numbers of a list.
     fn state_of<'t>(numbers: &[Expression<'t>]) -> Parts<Expression<'t>, B> {
         let (mean, covariance) = numbers.split_at(Self::carried().means);
         Parts::read::<N>(&mut mean.iter(), &mut covariance.iter(), mean[0].literal(0.0))
@@ -198,7 +199,7 @@ impl<const B: usize, const N: usize, G: Curve<f32>> SparseEkf<f32, Compact, B, N
     }
 }
 
-/// Squared deviations beyond which a tail does not count, in single precision.
+/// Returns the squared number of standard deviations beyond which a tail does not count, in single precision.
 fn clear() -> f32 {
     Weighing::of_any_limits(0.0, 0.0).clear()
 }

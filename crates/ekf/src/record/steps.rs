@@ -6,9 +6,9 @@ use ohmstrain_model::Scalar;
 use crate::Real;
 use crate::{Curve, Hypotheses, SignSplit, SparseEkf, Switch};
 
-/// Values that depend on the length of a step, as a list of numbers: a filter needs them to go on with steps of another length.
+/// Values that depend on the length of a step, as a list of numbers, with which a filter changes to steps of another length.
 impl<T: Scalar, S, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, B, N, G> {
-    /// The names of the numbers, of branch 0 as `b0_…`. One that begins with `b0_per_reach` is one over `b0_reach`.
+    /// Returns the names of the numbers, for branch 0 `b0_…`. `b0_per_reach` is the inverse of `b0_reach`.
     #[must_use]
     pub fn step_names(&self) -> Vec<String> {
         let (mut names, mut branch) = (Vec::new(), 0);
@@ -26,7 +26,7 @@ impl<T: Scalar, S, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, 
         names
     }
 
-    /// The numbers.
+    /// Returns the numbers.
     #[must_use]
     pub fn step_numbers(&self) -> Vec<T> {
         let (mut numbers, mut step) = (Vec::new(), self.step);
@@ -34,7 +34,7 @@ impl<T: Scalar, S, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, 
         numbers
     }
 
-    /// Changes to steps of `dt_s` seconds, whose numbers are given.
+    /// Changes to steps of `dt_s` seconds with the given numbers.
     pub fn set_step(&mut self, dt_s: T, numbers: &[T]) {
         let mut numbers = numbers.iter();
         self.step.visit(&mut |_, _, number| *number = numbers.next().copied().unwrap_or(*number));
@@ -43,7 +43,7 @@ impl<T: Scalar, S, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, 
 }
 
 impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: Curve<T>> SignSplit<T, B, N, K, S, G> {
-    /// See [`SparseEkf::set_step`]; takes also the probabilities of a change of phase, `[from][to]`.
+    /// See [`SparseEkf::set_step`]; also takes the probabilities of a change of phase, `[from][to]`.
     pub fn set_step(&mut self, dt_s: T, numbers: &[T], chain: [[T; 3]; 3]) {
         self.kernel.set_step(dt_s, numbers);
         self.chain = self.chain.map(|_| chain);
@@ -51,7 +51,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
 }
 
 impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: Curve<T>> Hypotheses<T, B, N, K, S, G> {
-    /// See [`SparseEkf::set_step`]; takes also the probabilities of a change of phase, `[from][to]`.
+    /// See [`SparseEkf::set_step`]; also takes the probabilities of a change of phase, `[from][to]`.
     pub fn set_step(&mut self, dt_s: T, numbers: &[T], chain: [[T; 3]; 3]) {
         self.kernel.set_step(dt_s, numbers);
         self.chain = chain;

@@ -3,17 +3,17 @@ use std::vec::Vec;
 
 use super::operation::{Operation, Place};
 
-/// Operations as they come, and the ways that comparisons choose.
+/// Operations in order, and the paths selected by comparisons.
 #[derive(Default)]
 pub(super) struct Tape {
     operations: RefCell<Vec<Operation>>,
-    /// Questions asked on this way, and the answers; answers that were given before are taken in turn.
+    /// Questions asked on this path, and their answers; answers given beforehand are used in turn.
     asked: RefCell<Vec<Place>>,
     answers: RefCell<Vec<bool>>,
 }
 
 impl Tape {
-    /// The place of an operation: of the same one, if it was done before.
+    /// Returns the place of an operation; an operation that was already recorded keeps its place.
     pub(super) fn place(&self, operation: Operation) -> Place {
         let mut operations = self.operations.borrow_mut();
         let place = operations.iter().position(|known| same(*known, operation)).unwrap_or(operations.len());
@@ -23,7 +23,7 @@ impl Tape {
         place
     }
 
-    /// Returns the answer that chooses the way: the one given before, and otherwise true.
+    /// Returns the answer that selects the path: the one given beforehand, otherwise true.
     pub(super) fn ask(&self, operation: Operation) -> bool {
         let place = self.place(operation);
         let (mut asked, mut answers) = (self.asked.borrow_mut(), self.answers.borrow_mut());
@@ -37,13 +37,13 @@ impl Tape {
         answers.get(number).copied().unwrap_or(true)
     }
 
-    /// Begins a way on which these are the first answers.
+    /// Begins a path with these first answers.
     pub(super) fn answer(&self, answers: &[bool]) {
         self.asked.borrow_mut().clear();
         *self.answers.borrow_mut() = answers.to_vec();
     }
 
-    /// Returns the questions asked on this way.
+    /// Returns the questions asked on this path.
     pub(super) fn asked(&self) -> Vec<Place> {
         self.asked.borrow().clone()
     }
@@ -64,7 +64,7 @@ impl Tape {
         }
     }
 
-    /// True if a truth is found without a division, a root or an exponential: such a question costs little even where it does not matter.
+    /// True if a truth value needs no division, root or exponential, and so costs little even if it is not needed.
     fn is_cheap(&self, place: Place) -> bool {
         let operation = self.operation(place);
         let is_dear = matches!(
@@ -80,7 +80,7 @@ impl Tape {
         !is_dear && operation.operands().all(|operand| self.is_cheap(operand))
     }
 
-    /// One of two results, numbers or truths.
+    /// Returns the selection between two results, numbers or truth values.
     pub(super) fn choose(&self, mask: Place, yes: Place, no: Place) -> Place {
         let [both, either] = [Operation::Both, Operation::Either].map(|of| move |a, b| self.place(of(a, b)));
         match (self.operation(yes), self.operation(no)) {
@@ -91,7 +91,7 @@ impl Tape {
             (Operation::Known(false), _) if self.is_cheap(no) => both(self.not(mask), no),
             (_, Operation::Known(true)) if self.is_cheap(yes) => either(self.not(mask), yes),
             (_, Operation::Known(false)) if self.is_cheap(yes) => both(mask, yes),
-            // A choice of the same result twice is one choice.
+            // Two selections of the same result are combined into one.
             (Operation::Pick(further, a, b), _) if b == no && self.is_cheap(further) => {
                 self.choose(both(mask, further), a, no)
             }
@@ -104,7 +104,7 @@ impl Tape {
             (_, Operation::Pick(further, a, b)) if b == yes && self.is_cheap(further) => {
                 self.choose(either(mask, self.not(further)), yes, a)
             }
-            // So is one that both ways ask for.
+            // So are selections by the same question in both branches.
             (Operation::Pick(yes_if, a, b), Operation::Pick(no_if, c, d)) if yes_if == no_if && (a == c || b == d) => {
                 let (first, second) = (self.choose(mask, a, c), self.choose(mask, b, d));
                 self.choose(yes_if, first, second)
@@ -114,7 +114,7 @@ impl Tape {
     }
 }
 
-/// Zeros of both signs compare as equal, and are not the same.
+/// True if two operations are the same. Zeros of both signs compare as equal but are not the same.
 fn same(a: Operation, b: Operation) -> bool {
     match (a, b) {
         (Operation::Constant(a), Operation::Constant(b)) => a.to_bits() == b.to_bits(),

@@ -1,4 +1,4 @@
-//! Tests that recorded functions, run operation by operation, give the bits of the kernel.
+//! Tests that recorded functions, run operation by operation, give the same bits as the kernel.
 
 #![allow(clippy::unwrap_used, reason = "tests")]
 
@@ -15,7 +15,7 @@ use crate::{Belief, Compact, Evidence, Gaussian, Reading, SparseEkf};
 type Filter = SparseEkf<f32, Compact, 2, 5>;
 type State = Belief<f32, 5, 15>;
 
-/// Runs the recorded operations: truths as 1 and 0.
+/// Runs the recorded operations, with truth values as 1 and 0.
 pub(super) fn run(recorded: &Recorded, inputs: &[f32]) -> Vec<f32> {
     let truth = |truth: bool| f32::from(u8::from(truth));
     let mut values: Vec<f32> = Vec::new();
@@ -77,7 +77,7 @@ fn filter(gauge: Gauge<f32>) -> Filter {
     SparseEkf::new(SwitchedModel::new(law, motion, noise).unwrap(), 0.05).unwrap()
 }
 
-/// States on the way of a body that stretches beyond the law's range, turns and comes back.
+/// Returns the states of a body that stretches beyond the law's range, turns and returns.
 fn states(filter: &Filter) -> Vec<State> {
     let mut belief: State = Belief::initial(filter.model());
     let state = |k: i32| {
@@ -95,7 +95,7 @@ fn compare(filter: &Filter, piece: Piece, state: &State, more: &[f32], expected:
     inputs.extend(more);
     inputs.extend(filter.step_numbers());
     let found = run(&filter.record(piece), &inputs);
-    // Zeros of both signs are the same here: where no lane goes a way, what it would have added is not added.
+    // Zeros of both signs are equal here: a branch that no lane takes adds nothing, not even zero.
     assert!(found == expected, "{piece:?}: {found:?}, expected {expected:?}");
 }
 
@@ -146,12 +146,12 @@ fn what_is_written_down_is_what_the_kernel_does() {
             compare(&filter, Piece::Sound, &state, &[], &[1.0]);
             clear += usize::from(state.mean[1].powi(2) > 9.0 * state.covariance[(1, 1)]);
         }
-        // Rates whose direction is clear, and others.
+        // Rates with a certain direction, and others.
         assert!(clear > 5 && clear < 70, "{clear}");
     }
 }
 
-/// Compares the questions of hypotheses on a side of zero about a state.
+/// Compares the pieces for a side of zero with the kernel, on a state.
 fn compare_side(filter: &Filter, state: &State, side: f32) {
     let (parts, clear) = (Parts::of(state), -2.0 * f32::EPSILON.ln());
     let truth = |truth: bool| f32::from(u8::from(truth));
@@ -169,7 +169,7 @@ fn compare_side(filter: &Filter, state: &State, side: f32) {
     }
 }
 
-/// States of the same motion, near each other and far apart, and limits that states are within, at and beyond.
+/// States of the same motion, near each other and far apart, with limits around, at and short of the states.
 #[test]
 fn what_is_written_down_of_pairs_and_limits_is_what_hypotheses_do() {
     let filter = filter(Gauge::Polynomial { coefficients: [1.9, -2.8, 1.0] });
@@ -214,7 +214,7 @@ fn a_state_that_is_none_is_not_sound() {
     compare(&filter, Piece::Sound, &state, &[], &[0.0]);
 }
 
-/// Numbers of another length, set one by one, make the filter of that length.
+/// Setting the numbers of another step length one by one gives the filter of that length.
 #[test]
 fn a_step_of_other_numbers_is_a_step_of_another_length() {
     let mut filter = filter(Gauge::Polynomial { coefficients: [1.9, -2.8, 1.0] });

@@ -4,27 +4,27 @@ use std::{format, vec};
 
 use super::{Expression, Fields, Operation, Place, Recorded, See, Tape};
 
-/// A function that has been written down for all ways that it may go, with what it is given and what it gives by name.
+/// A function recorded for all its paths, with named inputs and results.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Function {
-    /// Names of its inputs, by number.
+    /// Names of its inputs, by index.
     pub inputs: Vec<Name>,
-    /// Names of its results, in the order of what was recorded.
+    /// Names of its results, in the order of [`Recorded::results`].
     pub results: Vec<Name>,
     /// Recorded operations.
     pub recorded: Recorded,
 }
 
-/// Name of a number or a truth.
+/// Name of a number or truth value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Name {
     /// Name of a state's field.
     Field(String),
-    /// One that is handed over, or given back.
+    /// Name of an argument or a result.
     Own(String),
 }
 
-/// Writer of a function's inputs and results, while it is run for one of its ways.
+/// Writer of a function's inputs and results while it runs along one of its paths.
 pub struct Writer<'t> {
     tape: &'t Tape,
     inputs: &'t core::cell::RefCell<Vec<Name>>,
@@ -32,7 +32,7 @@ pub struct Writer<'t> {
 }
 
 impl<'t> Writer<'t> {
-    /// The number of an input.
+    /// Returns the index of an input.
     fn number_of(&self, name: Name) -> usize {
         let mut inputs = self.inputs.borrow_mut();
         let number = inputs.iter().position(|known| *known == name).unwrap_or(inputs.len());
@@ -42,25 +42,25 @@ impl<'t> Writer<'t> {
         number
     }
 
-    /// A number that is handed over.
+    /// Returns an input number.
     #[must_use]
     pub fn input(&self, name: &str) -> Expression<'t> {
         self.tape.input(self.number_of(Name::Own(name.into())))
     }
 
-    /// Returns `K` input numbers, handed over as a list.
+    /// Returns `K` input numbers, passed as a list.
     #[must_use]
     pub fn inputs<const K: usize>(&self, name: &str) -> [Expression<'t>; K] {
         core::array::from_fn(|k| self.input(&format!("{name}[{k}]")))
     }
 
-    /// A truth that is handed over.
+    /// Returns an input truth value.
     #[must_use]
     pub fn truth(&self, name: &str) -> bool {
         self.tape.ask(Operation::Flag(self.number_of(Name::Own(name.into()))))
     }
 
-    /// The state, its fields as they are when the function runs.
+    /// Returns the state with its fields at run time.
     #[must_use]
     pub fn state<S: Fields<Expression<'t>>>(&self, mut state: S) -> S {
         state.each(&mut Read(self));
@@ -72,12 +72,12 @@ impl<'t> Writer<'t> {
         state.each(&mut Keep(self));
     }
 
-    /// A number that the function gives.
+    /// Adds a number to the results.
     pub fn give(&mut self, name: &str, number: Expression<'t>) {
         self.results.push((Name::Own(name.into()), number.place_on(self.tape)));
     }
 
-    /// A truth that it gives.
+    /// Adds a truth value to the results.
     pub fn tell(&mut self, name: &str, truth: bool) {
         self.results.push((Name::Own(name.into()), self.tape.place(Operation::Known(truth))));
     }
@@ -88,7 +88,7 @@ fn presence(name: &str) -> Name {
     Name::Field(format!("has_{name}"))
 }
 
-/// Fields that are one number, or one of a list.
+/// Returns the names of a field that is a single number or a list.
 fn fields<const K: usize>(name: &str) -> [Name; K] {
     core::array::from_fn(|k| Name::Field(if K == 1 { name.into() } else { format!("{name}[{k}]") }))
 }
@@ -127,7 +127,7 @@ impl<'t> See<Expression<'t>> for Keep<'_, 't> {
         self.0.results.push((Name::Field(name.into()), self.0.tape.place(Operation::Known(*truth))));
     }
 
-    /// Numbers that are missing stay what they were.
+    /// Keeps the old values of missing numbers.
     fn maybe<const K: usize>(&mut self, name: &'static str, numbers: &mut Option<[Expression<'t>; K]>) {
         self.0.results.push((presence(name), self.0.tape.place(Operation::Known(numbers.is_some()))));
         for (k, field) in fields::<K>(name).into_iter().enumerate() {
@@ -143,7 +143,7 @@ impl<'t> See<Expression<'t>> for Keep<'_, 't> {
     }
 }
 
-/// Runs a function once for every way that it may go, and writes down which results each question chooses.
+/// Runs a function once for every possible path, and records the results that each question selects.
 ///
 /// ```
 /// use ohmstrain_ekf::record::{Operation, write_down};
@@ -164,7 +164,7 @@ pub fn write_down(function: impl for<'t> Fn(&mut Writer<'t>)) -> Function {
     Function { inputs, results, recorded }
 }
 
-/// The results of all ways that begin with these answers.
+/// Returns the results of all paths that begin with these answers.
 fn of_ways<'t>(
     tape: &'t Tape,
     inputs: &'t core::cell::RefCell<Vec<Name>>,
@@ -176,7 +176,7 @@ fn of_ways<'t>(
     function(&mut writer);
     let asked = tape.asked();
     let mut results = writer.results;
-    // What was not answered before went the way of truth.
+    // Questions without an answer were answered with true.
     for number in (answers.len()..asked.len()).rev() {
         let mut other_way = vec![true; number + 1];
         other_way[..answers.len()].copy_from_slice(answers);
@@ -206,7 +206,7 @@ mod tests {
     use crate::record::{Fields, See};
     use crate::{Gaussian, Reading};
 
-    /// Fields of a state in numbers: a missing value has no entry, truths are 1 and 0.
+    /// Fields of a state as numbers: a missing value has no entry, truth values are 1 and 0.
     #[derive(Default)]
     struct Seen(HashMap<String, f32>);
 
@@ -265,7 +265,7 @@ mod tests {
         }
     }
 
-    /// Readings with a spike, one that repeats, and some that stay beyond either end of their range.
+    /// Readings with a spike, a repeated number, and some that stay beyond either end of their range.
     fn readings() -> impl Iterator<Item = (usize, f32, f32)> {
         (0..400_u16).map(|k| {
             let t = f32::from(k);

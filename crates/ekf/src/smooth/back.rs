@@ -2,25 +2,25 @@ use ohmstrain_model::Scalar;
 
 use crate::{Estimator, Reading, StepError};
 
-/// A step as a smoother needs it: where it started, how long it was and what was read at its end.
+/// Data of a step for a smoother: the state at its start, its prepared length, and the reading at its end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PastStep<S, P, T> {
     /// The state from which the step was taken.
     pub from: S,
     /// The prepared step.
     pub prepared: P,
-    /// The reading at its end; `None` if it was missing or turned down.
+    /// The reading at its end; `None` if it was missing or rejected.
     pub reading: Option<Reading<T>>,
 }
 
-/// Smooths back through past steps, newest first, from the state after the newest. `visit` gets the state at the beginning
-/// of each step given all readings, and returns true to go on.
+/// Smooths back through past steps, newest first, from the state after the newest. `visit` receives the smoothed state at
+/// the start of each step, and returns true to continue.
 ///
-/// Only the states of the forward pass are stored: each step is computed again, with the same result. Returns true if
-/// the estimator has a smoother.
+/// Only the states of the forward pass are stored; each step is recomputed, with the same result. Returns true if the
+/// estimator has a smoother.
 ///
 /// # Errors
-/// See [`StepError`]; steps that went forward go backward.
+/// See [`StepError`]; steps that succeeded forward also succeed backward.
 pub fn smooth_back_through<'a, T, E, const N: usize, const L: usize>(
     estimator: &E,
     newest: &E::State,

@@ -1,4 +1,4 @@
-//! Looking back: smoothers.
+//! Smoothers.
 
 mod back;
 mod rts;

@@ -4,19 +4,20 @@ use ohmstrain_model::{Scalar, Transition};
 use crate::Belief;
 use crate::belief::psd::SemiDefinite;
 
-/// One step backwards of the Rauch-Tung-Striebel smoother.
+/// Performs one backward step of the Rauch-Tung-Striebel smoother.
 ///
 /// - `filtered`: belief at time k from the readings up to k.
-/// - `transition`, `prior`: how it led to time k+1 and what it predicted there; the stored linearisation, not a new one.
+/// - `transition`, `prior`: the transition to time k+1 and the prediction there; use the stored linearisation, not a new
+///   one.
 /// - `smoothed_next`: belief at k+1 from all readings.
 ///
-/// Returns the belief at k from all readings. The covariance is the sum `(I - G F) P (I - G F)ᵀ + G (Q + Pˢ) Gᵀ`, positive
-/// semi-definite under rounding. Exactly known states (a singular prior) are fine.
+/// Returns the belief at k from all readings. The covariance is the sum `(I - G F) P (I - G F)ᵀ + G (Q + Pˢ) Gᵀ`, which is
+/// positive semi-definite under rounding. Exactly known states (a singular prior) are valid input.
 ///
-/// A prior that is nearly singular is the hard case, as branches without noise of their own make it: a direction that
-/// has the share p of its variance makes G as large as 1/√p, and rounding enters the covariance as ε/p. Directions below
-/// p = ε^⅔ are therefore not smoothed, which costs p times the readings' signal-to-noise ratio and keeps the error below
-/// about N² ε^⅓.
+/// A nearly singular prior is the hard case; branches without process noise lead to it. A direction with the remaining
+/// share p of its variance makes G as large as 1/√p, and rounding enters the covariance as ε/p. Directions below p = ε^⅔
+/// are therefore not smoothed. That costs p times the readings' signal-to-noise ratio, and keeps the error below about
+/// N² ε^⅓.
 ///
 /// Source: Rauch, Tung, Striebel, *AIAA J.* 3 (1965) 1445.
 #[allow(non_snake_case, reason = "F, P, G, Q are the letters of every textbook; NOTATION.md has the table")]

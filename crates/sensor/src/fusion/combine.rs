@@ -10,14 +10,15 @@ pub struct Member {
 }
 
 impl Member {
-    /// A member that says nothing.
+    /// A member without an estimate.
     pub const UNKNOWN: Self = Self { strain: f64::NAN, sd: f64::NAN };
 }
 
-/// The best linear unbiased estimate from members whose errors are correlated, with no weight below zero: a member with a negative weight
-/// would be believed to be wrong.
+/// Returns the best linear unbiased estimate from members with correlated errors, restricted to weights that are not negative: a
+/// negative weight would assume that a member is wrong.
 ///
-/// `covariance(i, j)` is that of the errors of members i and j in units of their deviations. `None` if there is no member, or the numbers allow no estimate.
+/// `covariance(i, j)` is the covariance of the errors of members i and j, in units of their standard deviations. `None` if there is
+/// no member, or the covariance is not positive definite.
 ///
 /// Source: J. M. Bates, C. W. J. Granger, The combination of forecasts, *Operational Research Quarterly* 20 (1969) 451–468.
 #[must_use]

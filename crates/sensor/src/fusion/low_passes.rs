@@ -1,5 +1,5 @@
-/// Low-passes of ln R of several channels, exact for steps of any length. A channel that was not read for a while goes on with what came
-/// before, as far as the time constant remembers it.
+/// Low-passes of ln R of several channels, exact for steps of any length. After a gap, a channel continues from its old state,
+/// which has faded with the time constant.
 #[derive(Clone, Debug)]
 pub struct LowPasses {
     time_constants_s: Vec<f64>,
@@ -10,14 +10,15 @@ pub struct LowPasses {
 }
 
 impl LowPasses {
-    /// Low-passes that have seen nothing.
+    /// Creates low-passes without any reading.
     #[must_use]
     pub fn new(time_constants_s: &[f64], channels: usize) -> Self {
         let states = vec![vec![f64::NAN; channels]; time_constants_s.len()];
         Self { time_constants_s: time_constants_s.to_vec(), last_s: vec![None; channels], states }
     }
 
-    /// Takes ln R of each channel at a time; NaN is a missing one. The first one of a channel is its state.
+    /// Takes ln R of each channel at a time; NaN for a missing reading. The first reading of a channel initialises its
+    /// state.
     pub fn step(&mut self, time_s: f64, ln_r: &[f64]) {
         for (channel, value) in ln_r.iter().enumerate().filter(|(_, value)| value.is_finite()) {
             let elapsed_s = self.last_s[channel].map(|last_s| time_s - last_s);
@@ -41,7 +42,8 @@ impl LowPasses {
 mod tests {
     use super::LowPasses;
 
-    /// A step at 0 to 1 leaves a low-pass of 2 s with 1 − exp(−t/2) at t, in however many steps, and a channel that was away as well.
+    /// A step from 0 to 1 at time 0 leaves a low-pass of 2 s at 1 − exp(−t/2) at time t, in any number of steps, also in a channel
+    /// that was not read in between.
     #[test]
     fn steps_of_any_length_are_exact() {
         let mut low_passes = LowPasses::new(&[2.0], 2);

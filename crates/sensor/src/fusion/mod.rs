@@ -1,9 +1,9 @@
-//! Several channels that see one strain, fused: the channels' filters, and regressions on all their readings at once, weighted by how
-//! their errors vary together in parts that calibration left out.
+//! Fusion of several channels of one strain: the channels' filters, and regressions on all their readings at once, weighted by the
+//! covariance of their errors on held-out parts of the calibration.
 //!
-//! Readings of one strain lie near those of the calibration. A row that does not is looked at without each channel in turn: where that
-//! explains it, the channel is faulty and left out; where nothing does, the body moves as it did not in calibration, and no member is
-//! worth what it says.
+//! Normally the readings of a row lie near those of some calibration row. For any other row, each channel is left out in turn. If
+//! the rest then lies near the calibration, that channel is faulty and stays out. If no single channel explains the row, the body
+//! moves as it did not in calibration, and the variance of every member is increased.
 
 mod combine;
 mod low_passes;
@@ -20,11 +20,11 @@ pub use novelty::distance;
 pub use params::{FUSION_FORMAT, FusionParams, FusionRow, MOST_CHANNELS, RegressionParams};
 pub use regression::{FusionReadings, PRIOR_SD, Regression};
 
-/// Multiple of [`FusionParams::novelty`] beyond which a row is unlike the calibration.
+/// Multiple of [`FusionParams::novelty`] beyond which a row counts as unlike the calibration.
 pub const UNLIKE: f64 = 1.5;
-/// Channels that must be left to say that another one is faulty.
+/// Fewest other channels needed to declare a channel faulty.
 const FEWEST_WITNESSES: usize = 2;
-/// Sets of channels whose regressions are kept.
+/// Largest number of channel sets whose regressions are cached.
 const MOST_SETS: usize = 8;
 
 /// State of a channel at one time.
@@ -43,9 +43,9 @@ pub struct Fused {
     pub strain: f64,
     /// Its standard deviation.
     pub sd: f64,
-    /// Index of the channel that disagrees with all others and was left out.
+    /// Index of the faulty channel, which was left out.
     pub faulty: Option<usize>,
-    /// True if the readings are unlike any of the calibration, and no single channel explains it.
+    /// True if the readings are unlike any of the calibration, and no single channel explains that.
     pub is_unlike: bool,
 }
 
@@ -54,20 +54,20 @@ pub struct Fused {
 pub struct Fusion {
     params: Arc<FusionParams>,
     low_passes: LowPasses,
-    /// Regressions on sets of channels, those used last at the end.
+    /// Regressions on sets of channels, most recently used last.
     conditioned: VecDeque<Conditioned>,
 }
 
-/// Regressions that see some of the channels.
+/// Regressions on a subset of the channels.
 #[derive(Clone, Debug)]
 struct Conditioned {
     channels: Vec<usize>,
-    /// One for each of the parameters; `None` where the numbers allow none.
+    /// One for each entry of [`FusionParams::regressions`]; `None` where none can be computed.
     regressions: Arc<Vec<Option<Regression>>>,
 }
 
 impl Fusion {
-    /// A fusion that has seen nothing.
+    /// Creates a fusion without any reading.
     #[must_use]
     pub fn new(params: Arc<FusionParams>) -> Self {
         let low_passes = LowPasses::new(&params.low_pass_s, params.channels());
@@ -98,7 +98,7 @@ impl Fusion {
         Fused { strain: fused.strain.clamp(limits.lower, limits.upper), sd: fused.sd, faulty, is_unlike: novelty > 0.0 }
     }
 
-    /// Regressions on these channels, made when they are first asked for.
+    /// Returns the regressions on these channels, computed at first use.
     fn regressions(&mut self, channels: &[usize]) -> Arc<Vec<Option<Regression>>> {
         let place = self.conditioned.iter().position(|one| one.channels == channels);
         let known = place.and_then(|place| self.conditioned.remove(place));
@@ -116,15 +116,15 @@ impl Fusion {
 }
 
 impl FusionParams {
-    /// Regressions on these channels; `None` for each if there is no channel.
+    /// Computes the regressions on these channels; `None` for each if there is no channel.
     fn conditioned(&self, channels: &[usize]) -> Vec<Option<Regression>> {
         let rows: Vec<&FusionRow> = self.rows.iter().collect();
         let span = self.limits.span();
         self.regressions.iter().map(|params| Regression::new(&rows, params, channels, span)).collect()
     }
 
-    /// Index of the channel without which the readings are like some of the calibration, if they are not with it; and by how much they
-    /// are unlike them, 0 to 1, if there is no such channel.
+    /// Returns the faulty channel: the one without which the readings are like some of the calibration, although they are not with
+    /// it. If there is none, also returns the novelty of the readings, 0 to 1.
     fn faulty(&self, ln_r: &[f64]) -> (Option<usize>, f64) {
         let unlike = |ln_r: &[f64]| {
             distance(ln_r, self.rows.iter().map(|row| row.ln_r.as_slice()), &self.channel_sd) / self.novelty
@@ -144,8 +144,8 @@ impl FusionParams {
         explains.map_or_else(|| (None, (all - UNLIKE).min(1.0)), |(channel, _)| (Some(channel), 0.0))
     }
 
-    /// The members together, as far as readings that are unlike the calibration's (0 to 1) let them count: each member, and all of them
-    /// together, may then be off by the prior's standard deviation.
+    /// Combines the members. With a `novelty` of the readings of 0 to 1, that share of the prior variance is added to each member
+    /// and to the result.
     #[must_use]
     pub fn fused(&self, members: &[Member], novelty: f64) -> Option<Member> {
         let prior = novelty * (PRIOR_SD * self.limits.span()).powi(2);

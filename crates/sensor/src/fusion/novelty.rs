@@ -1,5 +1,5 @@
-/// Squared distance of readings from the nearest of `rows`, per channel, in units of the channels' typical differences. NaN stands for
-/// a channel that is not compared; without any the distance is zero.
+/// Returns the squared distance of readings from the nearest of `rows`, averaged over channels, in units of the channels' typical
+/// differences. NaN marks a channel that is not compared; if none is compared, the distance is zero.
 #[must_use]
 pub fn distance<'a>(ln_r: &[f64], rows: impl Iterator<Item = &'a [f64]>, channel_sd: &[f64]) -> f64 {
     let compared = ln_r.iter().filter(|value| value.is_finite()).count();

@@ -7,13 +7,13 @@ use crate::params::validate::table::{Allowed, FACTOR, POSITIVE, SIGNED, Table};
 
 /// Version of the fusion file this code reads and writes.
 pub const FUSION_FORMAT: u32 = 1;
-/// Most channels of one strain.
+/// Maximum number of channels of one strain.
 pub const MOST_CHANNELS: usize = 32;
 const COVARIANCE: Allowed = Allowed { least: -1e9, most: 1e9 };
-/// Noise of a regression: without any, rows that repeat make its matrix singular.
+/// Noise of a regression: without noise, repeated rows make its matrix singular.
 const NOISE: Allowed = Allowed { least: 1e-4, most: 1.0 };
 
-/// Fusion of several channels that see one strain: the content of a fusion file.
+/// Fusion of several channels of one strain: the content of a fusion file.
 ///
 /// Its members are the channels' filters, in order, and then the regressions of the strain on all readings.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -23,17 +23,18 @@ pub struct FusionParams {
     pub format: u32,
     /// Program and version that made it.
     pub made_by: String,
-    /// Factor on the fused standard deviation, from blocks left out.
+    /// Factor on the fused standard deviation, from held-out blocks.
     pub sd_scale: f64,
     /// The estimated quantity.
     pub quantity: Quantity,
     /// Range of the output.
     pub limits: RangeParams,
-    /// Squared distance from the calibration's readings, per channel, that one row in a hundred exceeds in blocks left out.
+    /// 99th percentile, over rows of held-out blocks, of the squared distance per channel from the calibration's readings.
     pub novelty: f64,
     /// Typical difference of ln R of each channel between rows in which the others agree.
     pub channel_sd: Vec<f64>,
-    /// Covariances of the members' errors in blocks left out, in units of their deviations, correlations shrunken; no variance is below one.
+    /// Covariances of the members' errors on held-out blocks, in units of their standard deviations, with shrunken correlations; no
+    /// variance is below one.
     pub error_covariance: Vec<Vec<f64>>,
     /// Time constants of the low-passes of ln R, s.
     pub low_pass_s: Vec<f64>,
@@ -63,7 +64,7 @@ pub struct FusionRow {
     pub strain: f64,
     /// ln R/R₀ of each channel.
     pub ln_r: Vec<f64>,
-    /// Low-passes of it: one list of channels for each time constant.
+    /// Low-passes of ln R/R₀: one list of channels for each time constant.
     pub low_passed: Vec<Vec<f64>>,
 }
 
@@ -77,7 +78,7 @@ impl FusionParams {
     /// Checks every number.
     ///
     /// # Errors
-    /// Names the first that is outside of its range, or a list of another length than the channels ask for.
+    /// Names the first number outside its range, or a list whose length does not match the number of channels.
     pub fn validate(&self) -> Result<(), FieldError> {
         let root = Table::root();
         self.limits.validate(&root.table("limits"))?;

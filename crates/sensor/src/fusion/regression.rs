@@ -3,15 +3,15 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use super::combine::Member;
 use super::params::{FusionRow, RegressionParams};
 
-/// Prior standard deviation of the strain, as a share of its range: that of any strain within it.
+/// Prior standard deviation of the strain, as a fraction of its range, wide enough for any strain within it.
 pub const PRIOR_SD: f64 = 0.4;
 
 /// ln R/R₀ of all channels at one time, and its low-passes.
 #[derive(Clone, Copy)]
 pub struct FusionReadings<'a> {
-    /// ln R/R₀ of each channel; NaN where it is not used.
+    /// ln R/R₀ of each channel; NaN for a channel that is not used.
     pub ln_r: &'a [f64],
-    /// Low-passes of it, for each time constant.
+    /// Low-passes of ln R/R₀: one list of channels for each time constant.
     pub low_passed: &'a [Vec<f64>],
 }
 
@@ -21,8 +21,8 @@ impl<'a> From<&'a FusionRow> for FusionReadings<'a> {
     }
 }
 
-/// A Gaussian process of the strain, conditioned on rows of the calibration, that sees some of the channels. Its kernel is a squared
-/// exponential and a linear one.
+/// Gaussian process of the strain on a subset of the channels, conditioned on rows of the calibration. Its kernel is the sum of a
+/// squared exponential and a linear one.
 ///
 /// Source: C. E. Rasmussen, C. K. I. Williams, *Gaussian Processes for Machine Learning* (2006), algorithm 2.1.
 #[derive(Clone, Debug)]
@@ -32,7 +32,7 @@ pub struct Regression {
     /// Range of the strain.
     span: f64,
     mean_strain: f64,
-    /// Mean of each input and one over its standard deviation.
+    /// Mean and inverse standard deviation of each input.
     scale: Vec<(f64, f64)>,
     /// Inputs of each row, scaled.
     inputs: Vec<Vec<f64>>,
@@ -41,7 +41,8 @@ pub struct Regression {
 }
 
 impl Regression {
-    /// Conditions a process that sees `channels` on rows; `None` if there are no rows or no channels, or if the numbers allow none.
+    /// Conditions a process on `channels` on rows; `None` if there are no rows or no channels, or the matrix is not positive
+    /// definite.
     #[must_use]
     pub fn new(rows: &[&FusionRow], params: &RegressionParams, channels: &[usize], span: f64) -> Option<Self> {
         let of_row = |row: &&FusionRow| raw_inputs(params, channels, FusionReadings::from(*row)).collect::<Vec<f64>>();
@@ -71,7 +72,7 @@ impl Regression {
         })
     }
 
-    /// The strain, its noise included.
+    /// Returns the strain; its standard deviation includes the noise.
     #[must_use]
     pub fn strain(&self, seen: FusionReadings) -> Member {
         let input = scaled(raw_inputs(&self.params, &self.channels, seen), &self.scale);
@@ -80,13 +81,13 @@ impl Regression {
         let mean = covariance.dot(&self.weights);
         self.factor.l_dirty().solve_lower_triangular_mut(&mut covariance);
         let prior = kernel(&input, &input, self.params.length);
-        // Rounding may take more from the variance than there is.
+        // Rounding may make the variance negative.
         let variance = (prior - covariance.norm_squared()).max(0.0) + self.params.noise * self.params.noise;
         Member { strain: self.mean_strain + mean * self.span, sd: variance.sqrt() * self.span }
     }
 }
 
-/// Inputs of a row: ln R of each channel and, for each low-pass, its difference from that.
+/// Returns the inputs of a row: ln R of each channel and, for each low-pass, the difference of ln R from it.
 fn raw_inputs<'a>(
     params: &'a RegressionParams,
     channels: &'a [usize],
@@ -97,7 +98,8 @@ fn raw_inputs<'a>(
     readings.chain(params.low_passes.iter().flat_map(move |&index| above(&seen.low_passed[index])))
 }
 
-/// Mean and one over the standard deviation of an input; a constant one counts for nothing.
+/// Returns the mean and inverse standard deviation of an input. The latter is zero for a constant input, which then has
+/// no effect.
 fn location(rows: &[Vec<f64>], input: usize) -> (f64, f64) {
     let n = rows.len() as f64;
     let mean = rows.iter().map(|row| row[input]).sum::<f64>() / n;
@@ -166,7 +168,7 @@ mod tests {
         assert!((found.sd - 0.3 * variance.sqrt()).abs() < 1e-11, "{found:?}");
     }
 
-    /// Far from all rows in a direction that no row went, the strain is as unknown as before, or more.
+    /// Far from all rows, in a direction in which no two rows differ, the strain is as uncertain as before, or more.
     #[test]
     fn what_no_row_has_shown_is_unknown() {
         let rows: Vec<FusionRow> =

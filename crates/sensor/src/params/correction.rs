@@ -3,10 +3,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::params::estimator::EstimatorKind;
 
-/// Features of the readings to come: those of the past read backwards, but for the reading itself.
+/// Number of features of the future: the features of the past, computed backwards in time, without the reading itself.
 pub const FUTURE_FEATURES: usize = FEATURES - 1;
 
-/// The learned correction of a filter's and a smoother's strain, as calibration has learned it.
+/// Learned correction of the strain of a filter and a smoother.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CorrectionParams {
@@ -18,19 +18,19 @@ pub struct CorrectionParams {
     pub filter: CorrectorParams,
     /// Correction of the smoother.
     pub smoother: CorrectorParams,
-    /// Process of simulated motions, which the sensor was not seen in, for the filter.
+    /// Process for the filter of simulated motions, which are not in the recordings.
     pub simulated: SimulatedParams,
-    /// Rows of the calibration that both have weights for, in order of time.
+    /// Rows of the calibration for which both have weights, in order of time.
     pub rows: Vec<TrainingRow>,
 }
 
-/// The law in simulated motions: a process of the features, by a few rows that stand for all.
+/// The law in simulated motions: a process of the features with a few inducing rows.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SimulatedParams {
     /// Mean strain.
     pub mean: f64,
-    /// Standard deviation of the strain that it leaves.
+    /// Standard deviation of the strain that the process leaves unexplained.
     pub sd: f64,
     /// Length scale of all inputs, in standard deviations of the input.
     pub length: f64,
@@ -40,37 +40,37 @@ pub struct SimulatedParams {
     pub rows: Vec<[f64; FEATURES]>,
 }
 
-/// The scale on which a correction sees readings.
+/// Scale of the readings for a correction.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CorrectionScale {
     /// The change of resistance `R/R₀ - 1` that counts as zero.
     pub centre: f64,
-    /// Distance from there that counts as one.
+    /// Distance from `centre` that counts as one.
     pub half_range: f64,
-    /// Usual sizes of the readings' two rates.
+    /// Typical magnitudes of the readings' two rates, 1/s.
     pub rates: [f64; 2],
-    /// Usual values of the low-passes at a reading y, a + b y: their starting values at the first reading.
+    /// Typical values of the low-passes at a reading y, a + b y; they start from these at the first reading.
     pub starts: Starts<f64>,
 }
 
-/// Parameters of the correction of one of the two estimates.
+/// Parameters of the correction of one estimate, the filter's or the smoother's.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CorrectorParams {
-    /// Factor on the corrected strain's standard deviation, from blocks left out.
+    /// Factor on the corrected strain's standard deviation, from held-out blocks.
     pub sd_scale: f64,
-    /// Standard deviation of the strain over the rows that it was learned from.
+    /// Standard deviation of the strain over the training rows.
     pub strain_sd: f64,
     /// Indices of [`CorrectionParams::rows`], inducing rows first.
     pub order: Vec<usize>,
-    /// Scales of the inputs over the rows that it was learned from.
+    /// Scales of the inputs over the training rows.
     pub inputs: InputScales,
     /// Strain from the features of the readings.
     pub direct: ProcessParams,
     /// Residual process: the error of the filter's strain, from its outputs and the features.
     pub residual: ProcessParams,
-    /// Strain from the features of the past alone, and from those of the future: a smoother's, none of a filter.
+    /// Strain from the features of the past alone, and from those of the future alone; empty for a filter.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub one_sided: Vec<ProcessParams>,
 }
@@ -81,7 +81,7 @@ pub struct CorrectorParams {
 pub struct InputScales {
     /// Means.
     pub mean: Vec<f64>,
-    /// Standard deviations; 0 for an input that never changes, which tells nothing.
+    /// Standard deviations; 0 for a constant input, which has no effect.
     pub sd: Vec<f64>,
     /// Smallest values.
     pub lower: Vec<f64>,
@@ -93,7 +93,7 @@ pub struct InputScales {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TrainingRow {
-    /// Time, s; recordings follow each other with a long pause.
+    /// Time, s; recordings are joined with a long pause in between.
     pub time_s: f64,
     /// The true strain.
     pub strain: f64,
@@ -107,9 +107,9 @@ pub struct TrainingRow {
     pub smoothed: [f64; OUTPUTS],
 }
 
-/// Inputs of the smoother's.
+/// Number of inputs of the smoother's correction.
 pub const SMOOTHER_INPUTS: usize = FILTER_INPUTS + FUTURE_FEATURES;
-/// One-sided processes of the smoother's.
+/// Number of one-sided processes of the smoother's correction.
 pub const SIDES: usize = 2;
 
 impl CorrectionScale {
@@ -120,8 +120,8 @@ impl CorrectionScale {
         FeatureScale { centre, half_range, rates, starts }
     }
 
-    /// Returns the scale for features of the future. Their low-passes start settled on the last reading: with fitted starts smoothers
-    /// were too sure of other motions.
+    /// Returns the scale for features of the future. Their low-passes start settled on the last reading: with fitted starts,
+    /// smoothers were overconfident in other motions.
     #[must_use]
     pub fn future(self) -> FeatureScale<f64> {
         FeatureScale { starts: settled(), ..self.past() }
@@ -129,20 +129,20 @@ impl CorrectionScale {
 }
 
 impl TrainingRow {
-    /// Inputs of the filter's correction.
+    /// Returns the inputs of the filter's correction.
     #[must_use]
     pub fn filter_inputs(&self) -> [f64; FILTER_INPUTS] {
         filter_inputs(&self.filtered, &self.past)
     }
 
-    /// Inputs of the smoother's.
+    /// Returns the inputs of the smoother's correction.
     #[must_use]
     pub fn smoother_inputs(&self) -> [f64; SMOOTHER_INPUTS] {
         smoother_inputs(&self.smoothed, &self.past, &self.future)
     }
 }
 
-/// Inputs of the smoother's correction.
+/// Returns the inputs of the smoother's correction.
 #[must_use]
 pub fn smoother_inputs(
     outputs: &[f64; OUTPUTS],
@@ -154,23 +154,23 @@ pub fn smoother_inputs(
     inputs
 }
 
-/// A Gaussian process as calibration has learned it: see [`Process`](ohmstrain_ekf::correction::Process).
+/// Parameters of a learned Gaussian process: see [`Process`](ohmstrain_ekf::correction::Process).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ProcessParams {
-    /// Factor on the process' standard deviation, from blocks left out.
+    /// Factor on the process' standard deviation, from held-out blocks.
     pub sd_scale: f64,
     /// Mean of the targets.
     pub mean: f64,
     /// Prior standard deviation where the kernel is 1.
     pub sd: f64,
-    /// Least prior standard deviation.
+    /// Smallest prior standard deviation.
     pub least_sd: f64,
     /// Standard deviation of the noise.
     pub noise_sd: f64,
-    /// Places of the inputs that the process sees, among the corrector's. The linear part of the kernel takes the first.
+    /// Indices of the process' inputs among the corrector's. The linear part of the kernel takes the first.
     pub inputs: Vec<usize>,
-    /// Length scale of each, in standard deviations of the input: the longer, the less it counts.
+    /// Length scale of each input, in its standard deviations; the longer, the less the input counts.
     pub lengths: Vec<f64>,
     /// Weight of each row, in the corrector's order.
     pub weights: Vec<f64>,

@@ -16,13 +16,13 @@ pub enum EstimatorKind {
     Imm,
     /// Gaussian hypotheses split by the sign of the rate.
     SignSplit,
-    /// Best phase histories.
+    /// Most probable phase histories.
     Hypotheses,
     /// A filter with the learned correction of its strain.
     Corrected,
 }
 
-/// A sensor file has no parameters for an estimator.
+/// Error of a sensor file without parameters for an estimator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[error("the sensor file has no parameters for `{0}`; calibrate with `{0}` as the estimator", kind.name())]
 pub struct NoParameters {
@@ -34,7 +34,7 @@ impl EstimatorKind {
     /// All estimators.
     pub const ALL: [Self; 6] = [Self::Ekf, Self::Ukf, Self::Imm, Self::SignSplit, Self::Hypotheses, Self::Corrected];
 
-    /// Each of them once, in the order in which they first come.
+    /// Returns each kind once, in order of first occurrence.
     #[must_use]
     pub fn distinct(kinds: impl IntoIterator<Item = Self>) -> Vec<Self> {
         let mut seen = Vec::new();
@@ -46,7 +46,7 @@ impl EstimatorKind {
         seen
     }
 
-    /// True if it keeps hypotheses about the phase; the others are one Gaussian.
+    /// True if it keeps hypotheses about the phase; the others keep one Gaussian.
     #[must_use]
     pub const fn has_phases(self) -> bool {
         !matches!(self, Self::Ekf | Self::Ukf)
@@ -66,46 +66,46 @@ impl EstimatorKind {
     }
 }
 
-/// Noise and motion as one estimator needs them.
+/// Noise and motion of one estimator.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EstimatorParams {
-    /// Mean negative log density of the true strain that the fit reached, in spans; smaller is better.
+    /// Mean negative log density of the true strain, in spans, that the fit reached; smaller is better.
     pub score: f64,
-    /// Factor on the filter's standard deviation of strain, from how its 95 % interval covered the calibration, every
-    /// block with the law that had not seen it.
+    /// Factor on the filter's standard deviation of strain, from the coverage of its 95 % interval on held-out blocks
+    /// of the calibration.
     pub strain_sd_scale: f64,
     /// Factor for the smoother, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub smoothed_sd_scale: Option<f64>,
     /// Parameters of the body's motion.
     pub motion: MotionParams,
-    /// Noise: what the law does not explain.
+    /// Noise: the part of the reading that the law does not explain.
     pub noise: NoiseParams,
     /// Durations and order of phases, for estimators that keep phase hypotheses.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub phases: Option<PhaseParams>,
-    /// Relaxation of the readings while the strain is held; `None` if calibration has not seen holds.
+    /// Relaxation of the readings while the strain is held; `None` if the calibration has no holds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub settling: Option<SettlingParams>,
 }
 
-/// Settling, as calibration has seen it in holds: see [`Settling`].
+/// Settling in the holds of the calibration: see [`Settling`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SettlingParams {
-    /// The longest of them, s.
+    /// Duration of the longest hold, s.
     pub horizon_s: f64,
-    /// Share of the branches' relaxation that came true.
+    /// Observed fraction of the branches' predicted relaxation.
     pub share: f64,
     /// Its standard deviation.
     pub share_sd: f64,
-    /// Standard deviation of what does not grow with the relaxation, relative to R₀.
+    /// Standard deviation of the part that does not grow with the relaxation, relative to R₀.
     pub sd: f64,
 }
 
 impl SettlingParams {
-    /// Converts it to the form that estimates use.
+    /// Converts it to the form used by estimates.
     #[must_use]
     pub const fn to_model(self) -> Settling<f64> {
         let Self { horizon_s, share, share_sd, sd } = self;
@@ -130,7 +130,7 @@ pub struct PhaseParams {
 }
 
 impl PhaseParams {
-    /// Returns the durations of phases and the phases that follow.
+    /// Returns the dwell model: durations of phases and transitions between them.
     ///
     /// # Errors
     /// If a number is out of its range.
@@ -149,22 +149,22 @@ impl PhaseParams {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NoiseParams {
-    /// Error of a reading that the baseline does not take up.
+    /// Standard deviation of a reading's error beyond the baseline.
     pub reading_sd: f64,
-    /// Time over which these errors are alike, s; 0 where every reading has one of its own. Of the information in a reading
-    /// a share 1 - exp(-dt/T) is new, dt after the one before, so that the same parameters fit any sampling.
+    /// Correlation time T of these errors, s; 0 if they are independent. A fraction 1 - exp(-dt/T) of the information in a
+    /// reading, dt after the previous one, is new, so that the same parameters fit any sampling rate.
     #[serde(default)]
     pub reading_time_s: f64,
-    /// Wander of each branch.
+    /// Long-run standard deviation of each branch around its law.
     pub branch_sd: f64,
-    /// Wander of the baseline.
+    /// Long-run standard deviation of the baseline.
     pub baseline_sd: f64,
     /// Correlation time of the baseline, s.
     pub baseline_time_s: f64,
 }
 
 impl NoiseParams {
-    /// Converts it to the model's noise, for a reading on its own.
+    /// Converts it to the model's noise, for a single reading.
     #[must_use]
     pub const fn to_model(self) -> ModelNoise<f64> {
         ModelNoise {
@@ -183,7 +183,7 @@ impl NoiseParams {
     }
 }
 
-/// Parameters of the body's motion: an Ornstein-Uhlenbeck velocity, by standard deviations of strain and rate.
+/// Parameters of the body's motion: an Ornstein-Uhlenbeck rate, given by standard deviations of strain and rate.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(into = "MotionTable", from = "MotionTable")]
 pub struct MotionParams {
@@ -197,7 +197,7 @@ pub struct MotionParams {
     pub strain_sd: f64,
 }
 
-/// A motion as it stands in a sensor's file.
+/// A motion in the form of a sensor's file.
 #[derive(Serialize, Deserialize)]
 #[serde(tag = "family", rename_all = "kebab-case", deny_unknown_fields)]
 enum MotionTable {
@@ -222,7 +222,7 @@ impl MotionParams {
     /// Converts it to the model's motion.
     ///
     /// # Errors
-    /// Names the parameter that no motion can have.
+    /// Names the invalid parameter.
     pub fn to_model(self) -> Result<Motion<f64>, ParameterError> {
         Motion::ornstein_uhlenbeck(self.rate_time_s, self.rate_sd_per_s, self.strain_mean, self.strain_sd)
     }

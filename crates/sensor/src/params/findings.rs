@@ -1,24 +1,24 @@
-//! Findings of a calibration, kept with the sensor. Nothing computes with them.
+//! Findings of a calibration, stored with the sensor. No computation uses them.
 
 use serde::{Deserialize, Serialize};
 
 use crate::params::range::RangeParams;
 use crate::params::summary::{Limit, Summary};
 
-/// Tenths of a range.
+/// Number of tenths of a range.
 pub const TENTHS: usize = 10;
 
-/// Scores of a calibration, and what it rests on.
+/// Scores of a calibration, and a summary of its recordings.
 ///
-/// Every quarter of the recordings is estimated by a law and a correction that were fitted to the other three, and scored;
-/// the static cubic likewise. Structure, ridge, noise and motion were chosen with all quarters in view, so that a
-/// recording of another day may be estimated somewhat worse.
+/// Every quarter of the recordings is estimated with a law and a correction fitted to the other three, and scored; so is
+/// the static cubic. Structure, ridge, noise and motion were chosen on all quarters, so estimates of a recording of
+/// another day may be somewhat worse.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Findings {
-    /// The default estimator's filter on the quarters left out.
+    /// The default estimator's filter on the held-out quarters.
     pub filter: Scores,
-    /// Its smoother, which sees the whole recording; `None` if it has none.
+    /// Its smoother, which uses the whole recording; `None` if it has none.
     pub smoother: Option<Scores>,
     /// The static cubic.
     pub static_cubic: Scores,
@@ -38,7 +38,7 @@ pub struct RecordingSummary {
     pub range: RangeParams,
     /// Share of the rows, 0 to 1, in each tenth of that range, lowest first.
     pub tenths: [f64; TENTHS],
-    /// Speeds that a quarter of the moving rows is below, and above, per second.
+    /// Lower and upper quartile of the speed in moving rows, 1/s.
     pub quartile_speeds: (f64, f64),
     /// 99th percentile of the speed, per second.
     pub fastest_rate: f64,
@@ -46,15 +46,16 @@ pub struct RecordingSummary {
     pub longest_hold_s: f64,
     /// Longest recording, s.
     pub longest_s: f64,
-    /// Rows with reading and reference.
+    /// Number of rows with reading and reference.
     pub rows: usize,
 }
 
-/// Contributions to the error of a calibrated filter, from parts of the recordings that its law was not fitted to.
+/// Contributions to the error of a calibrated filter, from held-out parts of the recordings.
 ///
-/// Law, drift and noise are what the law leaves of the readings where the true strain drives it, in percent of the readings'
-/// range: what is the same throughout a part is drift, what differs from row to row is noise, the rest is the law's. The
-/// direction is the filter's affair: the squared error of rows in which it takes stretching for releasing, or the reverse.
+/// Law, drift and noise are parts of the residual of the readings when the true strain drives the law, in percent of the
+/// readings' range. The part that is constant over a held-out part is drift, the part that differs from row to row is noise,
+/// and the rest is the law's. Direction is the filter's contribution: the squared error of rows in which it takes stretching
+/// for releasing, or the reverse.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ErrorBudget {
@@ -66,7 +67,7 @@ pub struct ErrorBudget {
     pub noise_percent: f64,
     /// Share of the moving rows, 0 to 1, in which the direction is wrong.
     pub wrong_rows: f64,
-    /// Share of all squared error, 0 to 1, in those rows.
+    /// Share of the total squared error, 0 to 1, in those rows.
     pub wrong_error: f64,
 }
 
@@ -74,7 +75,7 @@ pub struct ErrorBudget {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scores {
-    /// Rows scored.
+    /// Number of rows scored.
     pub n: usize,
     /// Root mean squared error, in the unit of strain.
     pub rmse: f64,
@@ -82,40 +83,42 @@ pub struct Scores {
     pub rmse_percent_fs: f64,
     /// Mean absolute error, in the unit of strain.
     pub mae: f64,
-    /// Mean error.
+    /// Mean error, in the unit of strain.
     pub bias: f64,
-    /// Share of rows whose 50 % interval holds the truth; empty for estimates without a deviation.
+    /// Share of rows whose 50 % interval contains the truth; `None` for estimates without a standard deviation.
     pub coverage_50: Option<f64>,
-    /// Share of rows whose 90 % interval holds the truth.
+    /// Share of rows whose 90 % interval contains the truth.
     pub coverage_90: Option<f64>,
-    /// Share of rows whose 95 % interval holds the truth.
+    /// Share of rows whose 95 % interval contains the truth.
     pub coverage_95: Option<f64>,
-    /// Mean width of the 95 % interval, in the unit of strain: what the coverage was bought with.
+    /// Mean width of the 95 % interval, in the unit of strain: the price of the coverage.
     pub width_95: Option<f64>,
     /// Mean width of the 95 % interval in percent of full scale.
     pub width_95_percent_fs: Option<f64>,
-    /// Mean continuous ranked probability score, in the unit of strain: of a normal distribution with the estimate as its
-    /// mean, as reported (within the limits), and its deviation. Less is better, whether an error is too large or an
-    /// interval too wide; without a deviation it is the absolute error, so that estimates with and without one compare.
+    /// Mean continuous ranked probability score, in the unit of strain, of a normal distribution with the reported
+    /// estimate (within the limits) as its mean, and its standard deviation. Smaller is better: both large errors and
+    /// wide intervals increase it. Without a standard deviation it is the absolute error, so that estimates with and
+    /// without one are comparable.
     ///
     /// Source: Gneiting & Raftery, *J. Am. Stat. Assoc.* 102 (2007) 359, eq. 21.
     pub crps: f64,
     /// Mean continuous ranked probability score in percent of full scale.
     pub crps_percent_fs: f64,
-    /// Mean log density of the truth, strain in units of full scale; a reference is given a deviation of 0.5 % of it.
+    /// Mean log density of the truth, strain in units of full scale; the reference is assumed to have a standard
+    /// deviation of 0.5 % of it.
     pub log_score: Option<f64>,
-    /// Share of the time on the wrong branch: the error is above 20 % of full scale for 2 s or longer.
+    /// Share of the time in which the error is above 20 % of full scale for 2 s or longer.
     pub wrong_branch: f64,
 }
 
-/// Parts of a filter's squared error, each 0 to 1; together they are 1.
+/// Parts of a filter's squared error, each 0 to 1; they sum to 1.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ErrorShares {
     /// Share of the law's form and parameters.
     pub law: f64,
     /// Share of rows in which the direction is wrong.
     pub direction: f64,
-    /// Share of slow changes.
+    /// Share of slow changes that strain does not explain.
     pub drift: f64,
     /// Share of single readings' noise.
     pub noise: f64,
@@ -137,19 +140,19 @@ impl ErrorShares {
 }
 
 impl ErrorBudget {
-    /// Returns the shares of the squared error of the strain: of the rows where the direction is wrong; and of the other rows, divided
-    /// among law, drift and noise by the squares of their contributions to the readings.
+    /// Returns the shares of the squared error of the strain: that of the rows with a wrong direction, and that of the other rows,
+    /// divided among law, drift and noise in proportion to their squared contributions to the readings.
     #[must_use]
     pub fn shares(&self) -> ErrorShares {
         let squares = [self.law_percent, self.drift_percent, self.noise_percent].map(|percent| percent * percent);
         let sum: f64 = squares.iter().sum();
-        // Where the law leaves nothing, what there is of error is not told apart, and counted as the law's.
+        // Without any residual, the error cannot be divided and counts as the law's.
         let [law, drift, noise] = if sum > 0.0 { squares.map(|square| square / sum) } else { [1.0, 0.0, 0.0] };
         let others = 1.0 - self.wrong_error;
         ErrorShares { law: others * law, direction: self.wrong_error, drift: others * drift, noise: others * noise }
     }
 
-    /// Largest contribution to the error, of [`ErrorBudget::shares`].
+    /// Returns the largest of [`ErrorBudget::shares`].
     #[must_use]
     pub fn limit(&self) -> Limit {
         self.shares().sorted()[0].0

@@ -3,10 +3,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::params::range::RangeParams;
 
-/// Most branches.
+/// Maximum number of branches.
 pub const MOST_BRANCHES: usize = 4;
 
-/// The switched Kelvin-Voigt law with any number of branches up to four.
+/// The switched Kelvin-Voigt law with up to four branches.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LawParams {
@@ -14,7 +14,7 @@ pub struct LawParams {
     pub extend_viscosity_s: f64,
     /// Dash-pot while releasing, s.
     pub retract_viscosity_s: f64,
-    /// The strains it was fitted on; beyond them it goes on along the tangent.
+    /// Range of strains on which it was fitted; beyond it, the gauge curve continues along its tangent.
     pub range: RangeParams,
     /// Quasi-static curve.
     pub gauge: GaugeParams,
@@ -68,7 +68,7 @@ pub struct LawParameter<'a> {
     pub name: String,
     /// The number.
     pub value: &'a mut f64,
-    /// True if it stands for readings over R₀, so that with twice the R₀ it is half as large.
+    /// True if it is relative to R₀, so that doubling R₀ halves it.
     pub is_over_rest: bool,
 }
 
@@ -89,7 +89,7 @@ pub struct BranchParams {
 }
 
 impl LawParams {
-    /// All its numbers but the range: gauge, dash-pots, branches.
+    /// Returns all its numbers except the range: gauge, dash-pots, branches.
     pub fn parameters_mut(&mut self) -> Vec<LawParameter<'_>> {
         let (over_rest, not) = (true, false);
         let gauge = match &mut self.gauge {

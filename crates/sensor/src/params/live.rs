@@ -1,4 +1,4 @@
-//! Constants of a filter that runs for days, from the calibration of its sensor.
+//! Constants of a filter in long-term use, from the calibration of its sensor.
 
 use ohmstrain_ekf::live::{DOUBT, DoubtParts, RestBounds, RestSeen, SessionStart, Sieve, TurnSeen, Unread};
 
@@ -6,39 +6,41 @@ use crate::params::estimator::MotionParams;
 use crate::params::repeating::Repeating;
 use crate::params::{SensorParams, Sessions};
 
-/// Factor by which a reading may lie outside of the calibration's, and number of their ranges above them: another day, drift
-/// and strains that were not calibrated for do not double a resistance; a bad contact or a meter's overload does. The step
-/// from one reading to the next has no limit: a filter that downweights surprising readings does as well without one
-/// against spikes, and better against lasting changes, which such a limit has to let in after a while.
+/// Factor by which a reading may lie outside the calibrated readings, and number of their ranges by which it may lie above
+/// them. A new session, drift, or strains beyond the calibration do not double a resistance; a bad contact or a meter's
+/// overload does. The step from one reading to the next has no limit. A filter that downweights outliers handles spikes as
+/// well without one, and lasting changes better, which such a limit would have to accept after a while.
 const OUTSIDE: f64 = 2.0;
-/// Share of calibration's range of readings by which they have jumped.
+/// Smallest jump of the readings, as a fraction of their calibrated range.
 const JUMP: f64 = 0.08;
-/// A number that has come again for so many times the longest repetition in calibration is stuck.
+/// Repetition after which a reading counts as stuck, as a multiple of the longest repetition in calibration.
 const LONGER: f64 = 3.0;
 
-/// Relative tolerance of the rested sensor's reading around that in calibration: half of a change worth noticing, a tenth.
+/// Relative tolerance of the rested sensor's reading around that in calibration: half of a noteworthy change, which is a
+/// tenth.
 const TOLERANCE: f64 = 0.05;
-/// Time for which readings must stay in place to count as evidence about R₀, s: twice as long as a doubt of a start lasts.
+/// Time for which readings must stay constant to count as evidence about R₀, s: twice the duration of a doubt about a
+/// start.
 const LASTS_S: f64 = 10.0;
 /// Share of the range of readings within which the reading at rest counts as one of its ends.
 const AT_END: f64 = 0.25;
 
-/// Standard deviation of the strain, in spans, that a filter has at its start besides what it states. Started in motion, on six
-/// recordings, its errors of the first two seconds are 9 to 15 %FS where it states 7 to 11, and all but settled after ten.
+/// Additional standard deviation of the strain, in spans, at a filter's start. For starts in motion on six recordings, errors
+/// in the first two seconds are 9 to 15 %FS where 7 to 11 is stated; after ten seconds they have almost settled.
 const START: f64 = 0.1;
 
 impl SensorParams {
-    /// A reading as `R/R₀ - 1`.
+    /// Converts a reading to `R/R₀ - 1`.
     fn relative(&self, reading: f64) -> f64 {
         reading / self.rest_reading - 1.0
     }
 
-    /// Least and largest `R/R₀ - 1` of the calibration.
+    /// Returns the smallest and largest `R/R₀ - 1` of the calibration.
     fn relative_readings(&self) -> (f64, f64) {
         (self.relative(self.validity.reading_lower), self.relative(self.validity.reading_upper))
     }
 
-    /// Plausible readings: those that the calibration has seen, and far beyond them.
+    /// Returns the plausibility check of readings, whose bounds lie far outside the calibrated readings.
     #[must_use]
     pub fn sieve(&self) -> Sieve<f64> {
         let seen = &self.validity;
@@ -56,7 +58,7 @@ impl SensorParams {
         }
     }
 
-    /// Reading at rest; `None` where no recording of the calibration begins there.
+    /// Returns the reading at rest; `None` if no recording of the calibration begins at rest.
     #[must_use]
     pub fn rest_seen(&self) -> Option<RestSeen<f64>> {
         let rested = self.relative(self.measured_rest?);
@@ -69,9 +71,10 @@ impl SensorParams {
         Some(RestSeen { rested, tolerance: TOLERANCE * (1.0 + rested), lasts_s: LASTS_S, sign, end })
     }
 
-    /// Between which readings R₀ is calibration's. On the side of the largest strain the last reading of the calibration, or a
-    /// little more; on the other side that at rest, with what is left open to it, if the calibration has one and it is an end of
-    /// its readings: a sensor that was never at rest then may get there.
+    /// Returns the bounds of readings that agree with the calibrated R₀. On the side of the largest strain the bound is the last
+    /// reading of the calibration plus a margin. On the other side it is the reading at rest with its tolerance, if the
+    /// calibration has one at the end of its readings; otherwise there is no bound, because a sensor that never rested in
+    /// calibration may do so later.
     #[must_use]
     pub fn rest_bounds(&self) -> RestBounds<f64> {
         let seen = &self.validity;
@@ -89,32 +92,34 @@ impl SensorParams {
         }
     }
 
-    /// Estimate of R₀ from the first reading of a session; `None` for a calibration on one session, or on none that begins at rest.
+    /// Returns the estimator of R₀ from the first reading of a session; `None` if the calibration has only one session, or none
+    /// that begins at rest.
     fn session_start(&self) -> Option<SessionStart<f64>> {
         let (sessions, measured) = (self.sessions?, self.measured_rest?);
         Some(SessionStart { reading: self.relative(measured), weight: sessions.weight() })
     }
 
-    /// Variance of the strain from what a session's first reading leaves open of R₀, by the mean slope and at the mean of the readings.
+    /// Returns the variance of the strain due to the uncertainty of R₀ after a session's first reading, from the mean slope and at
+    /// mid-range of the readings.
     fn session_variance(&self, per_reading: f64) -> f64 {
         let (low, high) = self.relative_readings();
         let of = |sessions: Sessions| (sessions.left_sd() * (1.0 + 0.5 * (low + high)) * per_reading).powi(2);
         self.sessions.map_or(0.0, of)
     }
 
-    /// Turns of the readings; `None` in files of earlier versions.
+    /// Returns the turns of the readings; `None` for files of earlier versions.
     fn turns_seen(&self) -> Option<TurnSeen<f64>> {
         let turn = self.validity.turn() / self.rest_reading;
         self.validity.longest_unturned_s.map(|longest_s| TurnSeen { turn, longest_s })
     }
 
-    /// Doubts of a filter that runs with that motion.
+    /// Returns the doubts of a filter with this motion.
     #[must_use]
     pub fn filters_doubts(&self, motion: &MotionParams) -> DoubtParts<f64> {
         self.doubts(motion, self.unstated.filter_sd)
     }
 
-    /// Doubts of a smoother, likewise.
+    /// Returns the doubts of a smoother with this motion.
     #[must_use]
     pub fn smoothers_doubts(&self, motion: &MotionParams) -> DoubtParts<f64> {
         self.doubts(motion, self.unstated.smoother_sd)

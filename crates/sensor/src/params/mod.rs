@@ -1,4 +1,4 @@
-//! Content of `sensor.toml`, and the range of each of its numbers. It knows nothing of the calibration that makes it.
+//! Content of `sensor.toml`, and the range of each of its numbers. It does not depend on the calibration that makes it.
 
 pub(crate) mod correction;
 pub(crate) mod estimator;
@@ -25,15 +25,15 @@ use crate::params::static_cubic::StaticCubic;
 use crate::params::summary::{Summary, TestedSummary};
 use crate::params::unstated::Unstated;
 
-/// Largest factor on the deviations of a calibrated filter. A larger one is a sign of another error: calibrations report when
-/// they reach it.
+/// Largest factor on the deviations of a calibrated filter. A larger factor is a sign of another error; calibrations report
+/// when they reach it.
 pub const LARGEST_SD_SCALE: f64 = 5.0;
 /// Version of the parameter file this code reads and writes.
 pub const FORMAT: u32 = 9;
 
-/// Parameters of a sensor, all that a filter needs: the content of `sensor.toml`.
+/// Parameters of a sensor, everything that a filter needs: the content of `sensor.toml`.
 ///
-/// Strains stand for the reference quantity; with [`Quantity::AngleDeg`] they are degrees.
+/// "Strain" means the reference quantity; with [`Quantity::AngleDeg`], strains are in degrees.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SensorParams {
@@ -45,48 +45,48 @@ pub struct SensorParams {
     pub quantity: Quantity,
     /// Unit of the readings.
     pub reading: ReadingUnit,
-    /// R₀ of the law, which everything is relative to; Ω, or a ratio. A fitted number: see `measured_rest`.
+    /// R₀ of the law, to which everything is relative; Ω, or a ratio. It is fitted, not measured: see `measured_rest`.
     pub rest_reading: f64,
     /// Measured resistance at rest in calibration, before the first movement, in the same unit; `None` if no recording begins
-    /// at rest. A resistance measured at rest is compared with this one.
+    /// at rest. Later resistances at rest are compared with this one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub measured_rest: Option<f64>,
     /// Default estimator.
     pub default_estimator: EstimatorKind,
-    /// Summary of the calibration; `None` if nothing could be scored on parts left out.
+    /// Summary of the calibration; `None` if nothing could be scored on held-out parts.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub summary: Option<Summary>,
-    /// Scores on rows that were kept from the calibration; `None` if there were none.
+    /// Scores on test rows, which the calibration did not use; `None` if there were none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tested: Option<TestedSummary>,
     /// Range of the output: the reference's range in calibration, or a joint's stops.
     pub limits: RangeParams,
     /// Calibrated range.
     pub validity: Validity,
-    /// Differences between sessions; `None` for a calibration on one.
+    /// Differences between sessions; `None` for a calibration on one session.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sessions: Option<Sessions>,
-    /// Errors that the estimators do not state, from rows that the calibration was not fitted to.
+    /// Errors beyond those that the estimators state, from rows to which the calibration was not fitted.
     #[serde(default, skip_serializing_if = "Unstated::is_none")]
     pub unstated: Unstated,
-    /// The static inverse to compare with.
+    /// Static inverse, for comparison.
     pub static_cubic: StaticCubic,
-    /// A sensor glued across a joint, if it is one.
+    /// Geometry of the joint, if the sensor is glued across one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joint: Option<JointParams>,
     /// The sensor's law.
     pub law: LawParams,
     /// Noise and motion, per estimator.
     pub estimators: BTreeMap<EstimatorKind, EstimatorParams>,
-    /// The recordings it was calibrated on.
+    /// Recordings used for the calibration.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub recordings: Vec<RecordingInfo>,
-    /// Standard errors of the law's parameters from the recordings by themselves, without the ridge that the filter's law has. What
-    /// they do not tell is missing.
+    /// Standard errors of the law's parameters from the recordings alone, without the ridge that the filter's law has. Parameters
+    /// that the recordings do not determine are missing.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub uncertainty: Option<Uncertainty>,
-    /// Scores on parts left out, content of the recordings and contributions to the error; `None` if nothing could be scored, or of
-    /// an older version. Nothing computes with it.
+    /// Scores on held-out parts, content of the recordings and contributions to the error; `None` if nothing could be scored, or in
+    /// files of earlier versions. No computation uses it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub findings: Option<Findings>,
     /// Learned correction of the filter's error, if there is one.
@@ -105,7 +105,7 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// Its name in messages and columns.
+    /// Name in messages and columns.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -121,11 +121,11 @@ impl Quantity {
 pub enum ReadingUnit {
     /// Ω.
     Ohm,
-    /// A ratio to some resistance at rest.
+    /// A ratio to a resistance at rest.
     Ratio,
 }
 
-/// Calibrated range; outside of it results are extrapolations.
+/// Calibrated range; outside it, results are extrapolations.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Validity {
@@ -141,10 +141,10 @@ pub struct Validity {
     pub fastest_rate_per_s: f64,
     /// Longest recording, s.
     pub duration_s: f64,
-    /// True if readings drifted while a recording lasted: a longer run drifts farther. False in files of earlier versions.
+    /// True if readings drifted during a recording: a longer run drifts farther. False in files of earlier versions.
     #[serde(default)]
     pub drifts: bool,
-    /// Longest time for which a reading was repeated to the last digit, s.
+    /// Longest time for which a reading stayed equal to the last digit, s.
     pub longest_repeat_s: f64,
     /// Longest time between two turns of the readings, s: see [`Self::turn`]. `None` in files of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -154,11 +154,12 @@ pub struct Validity {
     pub resolution: Option<Resolution>,
 }
 
-/// Share of the range of readings by which one of them has to go back to have turned, and number of their noise's deviations.
+/// Smallest reversal of the readings that counts as a turn, as a fraction of their range and in standard deviations of their
+/// noise; the larger applies.
 const TURN: (f64, f64) = (0.03, 6.0);
 
 impl Validity {
-    /// Returns the way back of a reading that counts as a turn, in its unit.
+    /// Returns the smallest reversal of the readings that counts as a turn, in their unit.
     #[must_use]
     pub fn turn(&self) -> f64 {
         let (share, deviations) = TURN;
@@ -167,7 +168,7 @@ impl Validity {
     }
 }
 
-/// Resolution of the calibration's readings, in their unit: how often a still sensor repeats a number follows from it.
+/// Resolution of the calibration's readings, in their unit. It determines how often a still sensor repeats a reading.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Resolution {
@@ -177,25 +178,25 @@ pub struct Resolution {
     pub noise_sd: f64,
 }
 
-/// Differences between recordings: each is a session, with an R₀ of its own.
+/// Differences between recordings; each is a session with its own R₀.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sessions {
     /// Standard deviation of ln R₀ between sessions.
     pub rest_sd: f64,
-    /// Standard deviation, between sessions that begin at rest, of the logarithm of what is read then over R₀.
+    /// Standard deviation, between sessions that begin at rest, of the logarithm of the first reading over R₀.
     pub start_sd: f64,
 }
 
 impl Sessions {
-    /// Weight of a session's first reading in the best linear estimate of ln R₀.
+    /// Returns the weight of a session's first reading in the best linear estimate of ln R₀.
     #[must_use]
     pub fn weight(&self) -> f64 {
         let (rest, start) = (self.rest_sd.powi(2), self.start_sd.powi(2));
         rest / (rest + start)
     }
 
-    /// Standard deviation of ln R₀ that the first reading leaves.
+    /// Returns the standard deviation of ln R₀ given the first reading.
     #[must_use]
     pub fn left_sd(&self) -> f64 {
         self.start_sd * self.weight().sqrt()
@@ -214,7 +215,7 @@ pub struct JointParams {
     pub gauge_length_mm: f64,
 }
 
-/// A recording that went into the calibration.
+/// A recording used in the calibration.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RecordingInfo {
@@ -232,7 +233,7 @@ pub struct RecordingInfo {
     pub rest_reading: f64,
 }
 
-/// Uncertainty of the law's parameters, robust against residuals that are neither white nor even.
+/// Uncertainty of the law's parameters, robust against residuals that are correlated or heteroscedastic.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Uncertainty {
@@ -247,7 +248,7 @@ pub struct Uncertainty {
 }
 
 impl Uncertainty {
-    /// Correlations of the parameters, row by row; zero where a parameter has no variance.
+    /// Returns the correlations of the parameters, row by row; zero where a parameter has no variance.
     #[must_use]
     pub fn correlation(&self) -> Vec<Vec<f64>> {
         let errors = &self.standard_errors;
@@ -263,7 +264,7 @@ impl Uncertainty {
 }
 
 impl SensorParams {
-    /// The filter that runs for an estimator: itself, or the one whose strain is corrected.
+    /// Returns the filter behind an estimator: itself, or the one whose strain is corrected.
     #[must_use]
     pub fn filter_of(&self, kind: EstimatorKind) -> EstimatorKind {
         match &self.correction {
@@ -272,8 +273,8 @@ impl SensorParams {
         }
     }
 
-    /// Returns the names of those whose intervals were widened by the maximum, [`LARGEST_SD_SCALE`](crate::LARGEST_SD_SCALE), though the
-    /// held-out blocks may ask for more: of the default estimator, or of the filter that it corrects, `filter` or `smoother`.
+    /// Returns `filter`, `smoother` or both: those of the default estimator, or of the filter that it corrects, whose intervals
+    /// were widened by the maximum, [`LARGEST_SD_SCALE`](crate::LARGEST_SD_SCALE), although the held-out blocks may need more.
     #[must_use]
     pub fn widened_most(&self) -> Vec<&'static str> {
         let of = |kind: EstimatorKind| self.estimators.get(&self.filter_of(kind));
@@ -285,22 +286,22 @@ impl SensorParams {
         widened.into_iter().filter(|(_, scale)| at_most(*scale)).map(|(name, _)| name).collect()
     }
 
-    /// Resistance at rest in calibration, in its unit: R₀ of the law where nothing was read at rest.
+    /// Returns the reading at rest in calibration, in its unit; R₀ of the law if nothing was read at rest.
     #[must_use]
     pub fn rested(&self) -> f64 {
         self.measured_rest.unwrap_or(self.rest_reading)
     }
 
-    /// R₀ of the law on a day on which the rested sensor reads `measured`, in its unit.
+    /// Returns R₀ of the law for a session in which the rested sensor reads `measured`, in its unit.
     #[must_use]
     pub fn rest_reading_of(&self, measured: f64) -> f64 {
         self.rest_reading * (measured / self.rested())
     }
 
-    /// The parameters of an estimator.
+    /// Returns the parameters of an estimator.
     ///
     /// # Errors
-    /// If the file has none for it.
+    /// If the file has no parameters for it.
     pub fn estimator(&self, kind: EstimatorKind) -> Result<&EstimatorParams, NoParameters> {
         self.estimators.get(&kind).ok_or(NoParameters { kind })
     }

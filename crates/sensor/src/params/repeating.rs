@@ -2,17 +2,18 @@ use ohmstrain_ekf::live::{MOST_CODE_REPEATS, MOST_REPEATS};
 
 use crate::params::Resolution;
 
-/// Probability that a still sensor repeats one number as often as a stuck one.
+/// Probability that a still sensor repeats a reading so often that it counts as stuck.
 const FALSE_ALARM: f64 = 1e-6;
-/// Number of the noise's standard deviations from which on a step is coarse: a still sensor may give one number for ever.
+/// Number of the noise's standard deviations from which a step is coarse: a still sensor may then repeat one reading for
+/// ever.
 const COARSE: f64 = 4.0;
 
-/// Repetition of one number by a still sensor, from the step of its readings and their noise.
+/// Repetition of one reading by a still sensor, from the resolution of its readings and their noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Repeating {
     /// True where the step is coarse: no repetition is a fault.
     pub is_endless: bool,
-    /// Largest number of repetitions.
+    /// Largest plausible number of repetitions.
     pub most: f64,
     /// Variance of a converter's error, (R/R₀)², above which its step is coarse.
     pub fine_variance: f64,
@@ -22,8 +23,8 @@ impl Repeating {
     /// Repetition for files without step and noise: ten repetitions, and no converter is coarse.
     pub(super) const UNKNOWN: Self = Self { is_endless: false, most: MOST_REPEATS as f64, fine_variance: 1.0 };
 
-    /// Computes the repetition of readings over a rest resistance. The noise is Gaussian, the resistance in the middle of a step, where
-    /// one number comes most often.
+    /// Computes the repetition of readings relative to a rest resistance. The noise is assumed Gaussian, and the resistance in the
+    /// middle of a step, where repetitions are most frequent.
     pub(super) fn new(resolution: Resolution, rest_reading: f64) -> Self {
         let Resolution { step, noise_sd } = resolution;
         let coarse = COARSE * noise_sd;
@@ -43,8 +44,8 @@ mod tests {
     use super::Repeating;
     use crate::params::Resolution;
 
-    /// Repetitions of a number by readings of a still sensor, by a random walk over integers: the middle of a step, noise from a sum of twelve
-    /// uniform numbers.
+    /// Returns the longest repetition in simulated readings of a still sensor in the middle of a step, with noise from a sum of
+    /// twelve uniform numbers.
     fn longest_of_still_sensor(step_in_sds: f64, rows: usize) -> usize {
         let mut state = 1_u64;
         let mut uniform = || {
@@ -61,7 +62,8 @@ mod tests {
         longest
     }
 
-    /// Tests a still sensor: in 20 000 rows a number repeats that often with a probability of two per cent, and half as often almost surely.
+    /// Tests a still sensor: in 20 000 rows, a reading repeats that often with a probability of two per cent, and half as often
+    /// almost surely.
     #[test]
     fn a_still_sensor_is_not_stuck() {
         for step_in_sds in [1.0, 1.5, 2.0] {

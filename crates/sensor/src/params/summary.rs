@@ -1,18 +1,17 @@
 use serde::{Deserialize, Serialize};
 
-/// Scores of a calibration in a few numbers, kept with the sensor: see [`Findings`](crate::Findings). Nothing computes with them.
+/// Main scores of a calibration, stored with the sensor: see [`Findings`](crate::Findings). No computation uses them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Summary {
-    /// Root mean squared error of the default estimator's filter on quarters that it was not fitted to, percent of full
-    /// scale.
+    /// Root mean squared error of the default estimator's filter on held-out quarters, percent of full scale.
     pub left_out_percent_fs: f64,
-    /// Its smoother's; `None` if it has none.
+    /// Root mean squared error of its smoother; `None` if it has none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub smoothed_percent_fs: Option<f64>,
-    /// The static cubic's on the same quarters.
+    /// Root mean squared error of the static cubic on the same quarters.
     pub static_cubic_percent_fs: f64,
-    /// Share of their rows that the filter's 95 % interval holds, percent.
+    /// Coverage of the filter's 95 % interval in those quarters, percent.
     pub coverage_95_percent: f64,
     /// Mean width of that interval, percent of full scale.
     pub width_95_percent_fs: f64,
@@ -20,15 +19,15 @@ pub struct Summary {
     pub limited_by: Limit,
 }
 
-/// Scores of a sensor on rows that its calibration never saw, percent. Nothing computes with them.
+/// Scores of a sensor on rows that its calibration did not use, percent. No computation uses them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TestedSummary {
     /// Root mean squared error of the default estimator's filter, percent of full scale.
     pub filter_percent_fs: f64,
-    /// The static cubic's.
+    /// Root mean squared error of the static cubic, percent of full scale.
     pub static_cubic_percent_fs: f64,
-    /// Share of the rows that the filter's 95 % interval holds.
+    /// Coverage of the filter's 95 % interval, percent.
     pub coverage_95_percent: f64,
 }
 
@@ -47,7 +46,7 @@ pub enum Limit {
 }
 
 impl Limit {
-    /// Returns its name, in a word.
+    /// Returns its one-word name.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {

@@ -1,13 +1,13 @@
 use serde::{Deserialize, Serialize};
 
-/// Errors that the estimators do not state: standard deviations of the strain by which intervals are wider than theirs, so that
-/// 95 % intervals hold 95 % of the rows that the calibration was not fitted to.
+/// Errors beyond those that the estimators state: standard deviations of the strain that widen their intervals, so that 95 %
+/// intervals cover 95 % of the rows to which the calibration was not fitted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Unstated {
-    /// Deviation for filters.
+    /// Standard deviation for filters.
     pub filter_sd: f64,
-    /// Deviation for smoothers.
+    /// Standard deviation for smoothers.
     pub smoother_sd: f64,
 }
 

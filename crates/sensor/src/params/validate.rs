@@ -1,7 +1,7 @@
 //! The range of every number in a sensor's parameters, in one place.
 //!
-//! A file that is edited by hand, or was damaged, is refused with the name of the number; it never becomes a filter with
-//! wrong estimates.
+//! A damaged or badly edited file is rejected with the name of the number; it never becomes a filter with wrong
+//! estimates.
 
 mod correction;
 pub mod table;
@@ -26,14 +26,14 @@ const SHORTEST_RANGE: f64 = 1e-9;
 const REST_BEYOND: f64 = 100.0;
 /// Largest distance of the mean strain beyond the limits, in spans.
 const MEAN_BEYOND: f64 = 10.0;
-/// Strains at which that is looked at.
+/// Number of intervals of the law's range at whose ends the gauge is checked.
 const GAUGE_POINTS: u32 = 64;
 
 impl SensorParams {
     /// Checks every number.
     ///
     /// # Errors
-    /// Names the first that is outside of its range.
+    /// Names the first number outside its range.
     pub fn validate(&self) -> Result<(), FieldError> {
         let root = Table::root();
         root.number("rest_reading", self.rest_reading, POSITIVE)?;
@@ -66,7 +66,7 @@ impl SensorParams {
 }
 
 impl SensorParams {
-    /// R₀ in another unit than the readings, or one digit too many.
+    /// Rejects an R₀ in another unit than the readings, or with a digit too many.
     fn check_rest(&self, root: &Table) -> Result<(), FieldError> {
         let Validity { reading_lower, reading_upper, .. } = self.validity;
         let (least, most) = (reading_lower / REST_BEYOND, reading_upper * REST_BEYOND);
@@ -78,7 +78,7 @@ impl SensorParams {
     }
 }
 
-/// Two ends in order, the upper one by more than rounding.
+/// Checks that two ends are in order, the upper one larger by more than rounding.
 fn ends(table: &Table, names: [&str; 2], lower: f64, upper: f64, allowed: Allowed) -> Result<(), FieldError> {
     table.number(names[0], lower, allowed)?;
     table.number(names[1], upper, allowed)?;
@@ -124,7 +124,7 @@ impl RangeParams {
     /// Checks every number.
     ///
     /// # Errors
-    /// Names the first that is outside of its range.
+    /// Names the first number outside its range.
     pub fn validate(self, table: &Table) -> Result<(), FieldError> {
         ends(table, ["lower", "upper"], self.lower, self.upper, SIGNED)
     }
@@ -134,7 +134,7 @@ impl Validity {
     /// Checks every number.
     ///
     /// # Errors
-    /// Names the first that is outside of its range.
+    /// Names the first number outside its range.
     pub fn validate(&self, table: &Table) -> Result<(), FieldError> {
         ends(table, ["lower", "upper"], self.lower, self.upper, SIGNED)?;
         ends(table, ["reading_lower", "reading_upper"], self.reading_lower, self.reading_upper, POSITIVE)?;

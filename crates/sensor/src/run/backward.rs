@@ -2,24 +2,25 @@ use std::mem;
 
 use ohmstrain_ekf::{Estimator, PastStep, Reading, Repeated, StepError, Substeps};
 
-/// A step, as a smoother needs it.
+/// Data of a step that a smoother needs.
 pub(crate) type Taken<E, const N: usize, const L: usize> =
     PastStep<<E as Estimator<f64, N, L>>::State, Repeated<<E as Estimator<f64, N, L>>::Prepared, f64>, f64>;
 
-/// A row on the way forward, as a smoother needs it.
+/// Data of a row in the forward pass that a smoother needs.
 pub(crate) enum KeptStep<E: Estimator<f64, N, L>, const N: usize, const L: usize> {
     /// The step to a reading that was used.
     Read(Taken<E, N, L>),
-    /// A row without one: the state that the readings before it predict, and the whole steps of the pause that the filter has
-    /// taken there.
+    /// A row without a reading that was used: the predicted state, and the whole steps of the pause that the filter has taken
+    /// there.
     Unread { predicted: Box<E::State>, whole: Option<Box<Taken<E, N, L>>> },
 }
 
-/// The way back over rows, newest first. It leads from reading to reading; a row without one branches off from the reading after it.
+/// The backward pass over rows, newest first. It steps from reading to reading; a row without a reading is smoothed from the
+/// reading after it.
 pub(crate) struct Backward<S> {
-    /// State at the last reading before the rows that have been passed, or whole steps after it, given all readings.
+    /// Smoothed state at the last reading before the rows already passed, or whole steps after that reading.
     smoothed: S,
-    /// The reading after that: its time, s, as it was used, and the state there.
+    /// The reading after that: its time, s, the reading as used, and the smoothed state.
     ahead: Option<(f64, Option<Reading<f64>>, S)>,
 }
 
@@ -29,8 +30,8 @@ impl<S: Clone> Backward<S> {
         Self { smoothed: last, ahead: None }
     }
 
-    /// Passes a row and shows its state, given all readings; goes on to the row before it only if `is_to_go_on`. Returns true if the
-    /// estimator has a smoother.
+    /// Passes a row, calls `show` with its smoothed state, and moves on to the row before it only if `is_to_go_on`. Returns true if
+    /// the estimator has a smoother.
     pub(crate) fn over<E, const N: usize, const L: usize>(
         &mut self,
         estimator: &Substeps<E>,
@@ -65,7 +66,7 @@ impl<S: Clone> Backward<S> {
                     }
                 }
                 if let Some(step) = whole.as_ref().filter(|_| is_to_go_on) {
-                    // No reading after them tells more of the state before them.
+                    // Without a later reading, the state before these steps needs no smoothing.
                     let before =
                         if self.ahead.is_some() { earlier(step, &self.smoothed)? } else { Some(step.from.clone()) };
                     let Some(before) = before else { return Ok(false) };

@@ -19,14 +19,14 @@ use crate::run::running::{Reports, Running, SharedCorrection};
 use crate::run::{Filter, Smoother, Start};
 use crate::{SensorError, with_sizes};
 
-/// Share of the limits' span to which a given initial strain is believed.
+/// Standard deviation of a given initial strain, as a fraction of the limits' span.
 const START_SD: f64 = 1e-3;
 
-/// A filter for a sensor that knows what is no reading of it, and is not protected otherwise.
+/// Builds a filter for a sensor with the plausibility check of readings, and no other protection.
 ///
 /// # Errors
-/// If a number is out of its range, the sensor has no parameters for the estimator, or it has a number of branches that no
-/// filter is built for.
+/// If a number is out of its range, the sensor has no parameters for the estimator, or its number of branches is not
+/// supported.
 pub fn build_filter(
     params: &SensorParams,
     kind: Option<EstimatorKind>,
@@ -37,7 +37,7 @@ pub fn build_filter(
     build_filter_with(params, Learned::of(params).as_ref(), kind, &options)
 }
 
-/// A filter that shares a sensor's correction, [`Learned::of`] these parameters, with others.
+/// Builds a filter that shares a sensor's correction, [`Learned::of`] these parameters, with other filters.
 ///
 /// # Errors
 /// As [`build_filter`].
@@ -52,7 +52,7 @@ pub fn build_filter_with(
     recipe.filter(needed(learned, kind)?)
 }
 
-/// A smoother, with what its correction has learned. Of the options R₀ that is followed, second looks and doubts are not for it.
+/// Builds a smoother with its learned correction. It ignores three options: following R₀, second looks and doubts.
 ///
 /// # Errors
 /// As [`build_filter`].
@@ -67,7 +67,7 @@ pub fn build_smoother_with(
     recipe.smoother(needed(learned, kind)?)
 }
 
-/// The learned correction, if the estimator needs one.
+/// Returns the learned correction if the estimator needs one.
 fn needed(learned: Option<&Arc<Learned>>, kind: EstimatorKind) -> Result<Option<&Arc<Learned>>, SensorError> {
     if kind != EstimatorKind::Corrected {
         return Ok(None);
@@ -97,7 +97,7 @@ impl<'a> FilterParts<'a> {
         Ok(Self { kind, law: &params.law, estimator, parts: params.live_parts(&estimator), options, step_factor: 1.0 })
     }
 
-    /// Collects the parts of a filter for a law that is being calibrated: nothing is known about the readings yet.
+    /// Collects the parts of a filter for a law that is being calibrated, when nothing is known yet about the readings.
     pub fn of_law(kind: EstimatorKind, law: &'a LawParams, estimator: EstimatorParams, limits: RangeParams) -> Self {
         let parts = bare_parts(&estimator, limits);
         Self { kind, law, estimator, parts, options: Options::plain(), step_factor: 1.0 }
@@ -115,14 +115,14 @@ impl<'a> FilterParts<'a> {
         Self { options, ..self }
     }
 
-    /// Its filter, corrected by what has been learned, if anything.
+    /// Builds the filter, with the learned correction if there is one.
     pub fn filter(self, learned: Option<&Arc<Learned>>) -> Result<Box<dyn Filter>, SensorError> {
         let shared = |learned: &Arc<Learned>| (learned.past_scale(), SharedCorrection(Arc::clone(&learned.filter)));
         let learned = learned.map(shared);
         Ok(self.running(self.parts.with_correction(learned), None)?)
     }
 
-    /// Its smoother, the same way.
+    /// Builds the smoother, with the learned correction if there is one.
     pub fn smoother(self, learned: Option<&Arc<Learned>>) -> Result<Box<dyn Smoother>, SensorError> {
         let given = self.options.protections;
         let protections = Protections { second_look: false, following: false, doubts: false, ..given };
@@ -138,13 +138,13 @@ impl<'a> FilterParts<'a> {
         let branches = self.law.branches.len();
         #[cfg(not(test))]
         let built = with_sizes!(branches, B, N, L => self.of_size::<B, N, L>(parts, learned));
-        // Laws of unit tests have no branches: a fifth of the instances.
+        // Laws of unit tests have no branches, which takes a fifth of the instances.
         #[cfg(test)]
         let built = with_sizes!(@ branches, B, N, L, self.of_size::<B, N, L>(parts, learned), 0);
         built.unwrap_or_else(|| Err(SensorError::Branches { found: branches }))
     }
 
-    /// Any filter of a model of known size.
+    /// Builds any filter of a model of known size.
     fn of_size<const B: usize, const N: usize, const L: usize>(
         self,
         parts: LiveParts<f64, SharedCorrection>,
@@ -181,7 +181,7 @@ impl<'a> FilterParts<'a> {
     }
 }
 
-/// Surroundings of an estimator.
+/// Components around an estimator.
 struct With<const B: usize, const N: usize> {
     parts: LiveParts<f64, SharedCorrection>,
     reports: Reports<B, N>,
@@ -201,11 +201,11 @@ impl<const B: usize, const N: usize> With<B, N> {
     }
 }
 
-/// Filter and smoother of one estimator.
+/// Filter and smoother with the same estimator.
 trait Both: Filter + Smoother {}
 impl<R: Filter + Smoother> Both for R {}
 
-/// The model of a law.
+/// Builds the model of a law.
 fn switched<const B: usize, const N: usize>(
     law: &LawParams,
     estimator: &EstimatorParams,
@@ -218,10 +218,10 @@ fn switched<const B: usize, const N: usize>(
     Ok(SwitchedModel::new(law, motion, estimator.noise.to_model())?)
 }
 
-/// Parameters of filters of phases besides the model.
+/// Parameters, besides the model, of filters with phase hypotheses.
 struct PhaseFilter {
     dwell: Dwell<f64>,
-    /// The same for a body that rests at times.
+    /// The same, for a body that sometimes rests.
     hold: Option<Dwell<f64>>,
     evidence: Evidence<f64>,
 }
@@ -235,7 +235,7 @@ impl PhaseFilter {
     }
 }
 
-/// Scales, limits and settling of the reports.
+/// Returns scales, limits and settling of the reports.
 fn reports<const B: usize, const N: usize>(
     estimator: &EstimatorParams,
     model: SwitchedModel<f64, B, N>,
@@ -253,7 +253,7 @@ fn reports<const B: usize, const N: usize>(
     }
 }
 
-/// Surroundings of a filter of readings R/R₀ of which nothing is known but the limits of the strain.
+/// Components around a filter of readings R/R₀ for which only the limits of the strain are known.
 fn bare_parts(estimator: &EstimatorParams, limits: RangeParams) -> LiveParts<f64, ()> {
     let EstimatorParams { motion, noise, .. } = estimator;
     let unread = Unread::new(motion.rate_time_s, motion.rate_sd_per_s, limits.to_model());
@@ -287,7 +287,7 @@ fn bare_parts(estimator: &EstimatorParams, limits: RangeParams) -> LiveParts<f64
 }
 
 impl SensorParams {
-    /// Surroundings of the filter with that estimator, without a correction.
+    /// Components around the filter with that estimator, without a correction.
     pub(crate) fn live_parts(&self, estimator: &EstimatorParams) -> LiveParts<f64, ()> {
         LiveParts {
             rest_reading: self.rest_reading,
@@ -300,7 +300,7 @@ impl SensorParams {
     }
 }
 
-/// Step for which filters are made before they know its length.
+/// Step length, s, for which filters are built before the real one is known.
 const NO_STEP_S: f64 = 0.0;
 
 /// Capacity of the sign-split filter.

@@ -8,11 +8,11 @@ pub(crate) struct Clock {
 }
 
 impl Clock {
-    /// The clock at the next row, and the time since the one before, s. None has passed at the first row. Differences of times that
-    /// follow each other are exact, and so are their sums: a pause is the same in one row or in many.
+    /// Returns the clock at the next row, and the time since the previous row, s; zero at the first row. Differences of successive
+    /// times are exact, and so are their sums: a pause has the same length in one row or in many.
     ///
     /// # Errors
-    /// If time is no number or goes backwards.
+    /// If time is not finite or goes backwards.
     pub(crate) fn at(self, time_s: f64) -> Result<(Self, f64), StepError> {
         let dt_s = time_s - self.last_s.unwrap_or(time_s);
         if !dt_s.is_finite() {
@@ -25,7 +25,8 @@ impl Clock {
     }
 }
 
-/// A length of which multiples are subtracted from such sums without rounding, s: shorter by a nanosecond at most.
+/// Returns a length, s, whose multiples can be subtracted from such sums without rounding; it is shorter by a
+/// nanosecond at most.
 pub(crate) fn floored(length_s: f64) -> f64 {
     const PARTS: f64 = 1_073_741_824.0;
     let floored = (length_s * PARTS).floor() / PARTS;

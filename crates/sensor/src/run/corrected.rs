@@ -10,16 +10,16 @@ use crate::run::learned::{Learned, OfSmoother};
 use crate::run::turns::Turns;
 use crate::run::{Output, Rows, SEGMENT, WayBack};
 
-/// A smoother on its way back, corrected segment by segment. Everything but the strain is the smoother's.
+/// The backward pass of a smoother, corrected segment by segment. Only the strain is corrected.
 ///
-/// At a missing reading the correction keeps its last features, and its variance grows by as much as the smoother's
-/// has grown since.
+/// At a missing reading the correction keeps its last features, and its variance grows as much as the smoother's has
+/// since.
 pub(crate) struct CorrectedWayBack<'a> {
     back: Box<dyn WayBack + 'a>,
     correction: Arc<OfSmoother>,
     rows: Rows<'a>,
-    /// Features of the past before each segment that is still to come. Readings that were kept from the filter
-    /// were seen here, as far as features go: within a segment they are not, and what was before it fades in seconds.
+    /// Features of the past before each segment not yet smoothed. These include readings that the filter rejected;
+    /// within a segment they are excluded, and the effect of earlier ones fades in seconds.
     starts: Vec<Watched>,
     /// Features of the future.
     ahead: Watched,
@@ -39,7 +39,7 @@ impl Watched {
         Self { features: ReadingFeatures::new(scale), time_s: None, known_variance: None }
     }
 
-    /// Takes a row in either direction of time.
+    /// Takes a row, in either direction of time.
     fn step(
         &mut self,
         time_s: f64,
@@ -50,7 +50,7 @@ impl Watched {
         self.features.step_unless(surprises, dt_s, reading)
     }
 
-    /// True if the last row had no reading that is seen here.
+    /// True if the last row had no reading for the features.
     fn missing(&self) -> bool {
         self.features.is_waiting()
     }
@@ -71,7 +71,7 @@ impl CorrectionReading {
         Self { reading: reading.and_then(finite), surprises: false }
     }
 
-    /// Returns the reading as the filter has taken it: none if it was rejected.
+    /// Returns the reading as the filter used it: none if it was rejected.
     fn new(output: &Output, reading: Option<Reading<f64>>) -> Self {
         let is_weighed_down = output.verdict == ReadingVerdict::Downweighted;
         let surprises = is_weighed_down && output.nis.is_some_and(|nis| nis > SURPRISING_NIS);
@@ -79,7 +79,7 @@ impl CorrectionReading {
     }
 }
 
-/// Inputs of a correction from a filter's output.
+/// Returns the inputs of a correction from a filter's output.
 #[must_use]
 pub fn outputs(output: &Output) -> [f64; OUTPUTS] {
     let estimate = &output.estimate;
@@ -88,7 +88,7 @@ pub fn outputs(output: &Output) -> [f64; OUTPUTS] {
 }
 
 impl<'a> CorrectedWayBack<'a> {
-    /// The way back of a smoother over a recording, corrected.
+    /// Wraps the backward pass of a smoother over a recording.
     pub(crate) fn new(back: Box<dyn WayBack + 'a>, learned: &Learned, rows: Rows<'a>) -> Self {
         let correction = Arc::clone(&learned.smoother);
         let mut starts = Vec::with_capacity(rows.len() / SEGMENT + 1);
@@ -103,7 +103,7 @@ impl<'a> CorrectedWayBack<'a> {
         Self { back, correction, rows, starts, ahead: Watched::new(learned.future_scale()) }
     }
 
-    /// Corrects a smoothed row; after the last reading the future is as at the last reading: settled.
+    /// Corrects a smoothed row. After the last reading, the future is taken as settled, as at the last reading.
     fn correct(&self, output: &Output, past: &[f64; FEATURES], future: Option<[f64; FEATURES]>) -> Gaussian<f64> {
         let future = future.map_or([0.0; FUTURE_FEATURES], future_features);
         let inputs = smoother_inputs(&outputs(output), past, &future);
@@ -137,7 +137,7 @@ impl WayBack for CorrectedWayBack<'_> {
             let Some(past) = past else { continue };
             let mut strain = self.correct(output, &past, future);
             if self.ahead.missing() {
-                // The readings on both sides bound what the smoother knows in between.
+                // The variance at the readings on both sides is the lower bound in between.
                 let least = [known, self.ahead.known_variance].into_iter().flatten().reduce(f64::min).unwrap_or(0.0);
                 strain.variance += (smoothed.variance - least).max(0.0);
             }
@@ -147,7 +147,7 @@ impl WayBack for CorrectedWayBack<'_> {
     }
 }
 
-/// Features of the readings to come: without the reading itself, which those of the past have.
+/// Returns the features of the future: without the reading itself, which the features of the past contain.
 #[must_use]
 pub fn future_features([_, others @ ..]: [f64; FEATURES]) -> [f64; FUTURE_FEATURES] {
     others

@@ -5,20 +5,21 @@ use ohmstrain_ekf::Gaussian;
 use ohmstrain_model::StrainRange;
 use serde::{Deserialize, Serialize};
 
-/// Known strains that count for a row: the last ones of a filter, half before and half after a smoother's row.
+/// Number of known strains used for a row: the last ones for a filter, half before and half after the row for a
+/// smoother.
 pub const MOST_KNOWN: usize = 16;
-/// Correlation time of errors that come and go with the motion, s.
+/// Correlation time of errors that vary with the motion, s.
 const FAST_S: f64 = 3.0;
 /// Correlation time of a day's offset and gain, s.
 const SLOW_S: f64 = 3600.0;
 /// Variance of the error of the gain, relative to that of the offset, for a strain that may be anywhere in the limits: a
-/// strain that is known near one end of them tells little of the other one.
+/// known strain near one end says little about the other end.
 const GAIN: f64 = 1.0;
-/// Beyond this distance from the middle of the limits, in spans, an error of the gain grows no more.
+/// Distance from the middle of the limits, in spans, beyond which an error of the gain grows no further.
 const FARTHEST: f64 = 0.6;
 
-/// Size of lasting errors, in stated variances: within a recording next to nothing, on another day many times what
-/// is stated. The known strains tell which one applies.
+/// Size of lasting errors, in stated variances: almost nothing within a recording, many times the stated variance on
+/// another day. The known strains determine which one applies.
 #[derive(Clone, Copy, Debug)]
 struct Size {
     /// Probability before any strain is known.
@@ -27,7 +28,7 @@ struct Size {
     slow: f64,
 }
 
-/// `docs/notes/2026-11-24-known-strains-figures.md` has what they were chosen on.
+/// `docs/notes/2026-11-24-known-strains-figures.md` documents their choice.
 const SIZES: [Size; 4] = [
     Size { probability: 0.85, fast: 0.97, slow: 0.03 },
     Size { probability: 0.08, fast: 0.7, slow: 0.3 },
@@ -35,27 +36,27 @@ const SIZES: [Size; 4] = [
     Size { probability: 0.03, fast: 1.0, slow: 30.0 },
 ];
 
-/// A strain that was known at a moment, and what had been stated of it.
+/// A strain known at one time, and its estimate.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct KnownStrain {
     /// Time, s.
     pub time_s: f64,
-    /// The strain, and how well it is known.
+    /// The known strain, with its variance.
     pub known: Gaussian<f64>,
     /// Estimate of the strain, without the effect of earlier known strains.
     pub estimated: Gaussian<f64>,
 }
 
-/// Errors of a filter at other times, from strains that were known for a moment.
+/// Errors of a filter at other times, inferred from strains known at single times.
 ///
-/// An error is a Gaussian process of the time: a part that lasts for seconds, in units of the deviation that is stated, an
-/// offset and an error of the gain that last for an hour, in units of what is stated on average where strains are known. How large
-/// these two are is one of a few sizes, weighed by how likely they make what was known (a mixture of Gaussian processes).
+/// The error is a Gaussian process in time. One part lasts for seconds, in units of the stated standard deviation. An offset and
+/// an error of the gain last for an hour, in units of the mean stated deviation where strains are known. Their magnitude is one of
+/// a few sizes, each weighted by the likelihood of the known strains (a mixture of Gaussian processes).
 #[derive(Clone, Debug)]
 pub struct KnownErrors {
     limits: StrainRange<f64>,
     strains: VecDeque<KnownStrain>,
-    /// Mean of the variances that were stated of them.
+    /// Mean of the stated variances of the known strains.
     usual: f64,
     /// One for each size.
     sizes: Vec<ErrorSize>,
@@ -65,14 +66,14 @@ pub struct KnownErrors {
 #[derive(Clone, Debug)]
 struct ErrorSize {
     size: Size,
-    /// Probability that it is this size.
+    /// Posterior probability of this size.
     weight: f64,
     covariance: Cholesky<f64, Dyn>,
     /// Inverse covariance times known errors.
     weighted: DVector<f64>,
 }
 
-/// A statement, as far as its error hangs together with that of another one.
+/// Time, standard deviation and lever of an estimate, which determine the covariance of its error with that of another.
 #[derive(Clone, Copy)]
 struct EstimatePoint {
     time_s: f64,
@@ -82,7 +83,7 @@ struct EstimatePoint {
 }
 
 impl Size {
-    /// Returns the covariance of errors at two places; `usual` is the variance that the slow part is relative to.
+    /// Returns the covariance of errors at two points; `usual` is the variance to which the slow part is relative.
     fn covariance(self, usual: f64, a: EstimatePoint, b: EstimatePoint) -> f64 {
         let apart_s = (a.time_s - b.time_s).abs();
         let fast = self.fast * a.sd * b.sd * (-apart_s / FAST_S).exp();
@@ -106,7 +107,7 @@ impl KnownErrors {
         errors
     }
 
-    /// Another strain is known. The oldest of more than [`MOST_KNOWN`] is forgotten.
+    /// Adds a known strain. The oldest of more than [`MOST_KNOWN`] is dropped.
     pub fn tell(&mut self, strain: KnownStrain) {
         if self.strains.len() == MOST_KNOWN {
             self.strains.pop_front();
@@ -115,7 +116,7 @@ impl KnownErrors {
         self.condition();
     }
 
-    /// Restates the estimate of the strain at a known time, which has changed since, for example after a lag.
+    /// Replaces the estimate at the time of a known strain, if it has changed since, for example after a lag.
     pub fn restate(&mut self, time_s: f64, estimated: Gaussian<f64>) {
         let mut is_new = false;
         for strain in self.strains.iter_mut().filter(|strain| strain.time_s == time_s) {
@@ -126,7 +127,7 @@ impl KnownErrors {
         }
     }
 
-    /// The strains that are known, oldest first.
+    /// Returns the known strains, oldest first.
     pub fn strains(&self) -> impl Iterator<Item = &KnownStrain> {
         self.strains.iter()
     }
@@ -137,7 +138,7 @@ impl KnownErrors {
         self.strains.is_empty()
     }
 
-    /// A statement at a time, without what is known of its error.
+    /// Corrects an estimate at a time by its expected error.
     #[must_use]
     pub fn correct(&self, time_s: f64, estimated: Gaussian<f64>) -> Gaussian<f64> {
         if self.sizes.is_empty() {
@@ -190,7 +191,7 @@ impl KnownErrors {
 }
 
 impl ErrorSize {
-    /// The error of a statement, if errors are of this size.
+    /// Returns the error of an estimate, given that errors are of this size.
     fn error(&self, usual: f64, here: EstimatePoint, known: impl Iterator<Item = EstimatePoint>) -> Gaussian<f64> {
         let shared = known.map(|place| self.size.covariance(usual, here, place));
         let shared = DVector::from_iterator(self.weighted.len(), shared);
@@ -215,7 +216,7 @@ mod tests {
         Gaussian { mean, variance: 4e-4 }
     }
 
-    /// Against the conditional distribution of two Gaussian numbers, for each size, and Bayes' rule.
+    /// Compares with the conditional distribution of two Gaussian variables for each size, and Bayes' rule.
     #[test]
     fn one_known_strain_is_conditioned_on() {
         let errors = KnownErrors::of(LIMITS, &[strain(10.0, 0.13, 0.1)]);
@@ -240,7 +241,7 @@ mod tests {
         }
     }
 
-    /// An error that is as stated at one moment is one of that moment; the same one at eight moments lasts.
+    /// An error as large as stated at one time does not last; the same error at eight times does.
     #[test]
     fn an_error_lasts_if_it_comes_again() {
         let off = |count: usize| {
@@ -249,12 +250,12 @@ mod tests {
             KnownErrors::of(LIMITS, &strains).correct(last_s + 30.0, estimate(0.2)).mean - 0.2
         };
         assert!(off(1) < 0.15 * 0.03 && off(8) > 0.7 * 0.03, "{} {}", off(1), off(8));
-        // One that is ten times what was stated can only be of another day.
+        // An error ten times as large as stated can only be one of another day.
         let surprising = KnownErrors::of(LIMITS, &[strain(0.0, 0.3, 0.1)]).correct(30.0, estimate(0.1));
         assert!(surprising.mean - 0.1 > 0.8 * 0.2, "{surprising:?}");
     }
 
-    /// A gain of 0.8 that two strains tell, far from where they were known.
+    /// A gain of 0.8, inferred from two strains, corrects estimates far from them.
     #[test]
     fn two_strains_tell_the_gain() {
         let strains = [(0.05, 0.1), (0.29, 0.4)].map(|(known, estimated)| strain(1000.0 * known, known, estimated));
@@ -266,7 +267,7 @@ mod tests {
         }
     }
 
-    /// Tests that only the last strains count, whether they are given one after another or all at once.
+    /// Tests that only the last strains count, whether given one by one or all at once.
     #[test]
     fn the_last_ones_count() {
         let strains: Vec<_> = (0..40).map(|k| strain(20.0 * f64::from(k), 0.2, 0.2 + 0.001 * f64::from(k))).collect();
@@ -280,7 +281,7 @@ mod tests {
             errors.correct(900.0, estimate(0.3)),
             KnownErrors::of(LIMITS, &strains).correct(900.0, estimate(0.3))
         );
-        // Where something else is stated later.
+        // An estimate is replaced later.
         let mut restated = strains.clone();
         restated[30].estimated.mean = 0.1;
         errors.restate(600.0, estimate(0.1));

@@ -17,7 +17,7 @@ pub struct Learned {
 
 /// The correction of a filter's strain.
 pub(crate) type OfFilter = OwnedCorrection<f64, FILTER_INPUTS>;
-/// The correction of a smoother's.
+/// The correction of a smoother's strain.
 pub(crate) type OfSmoother = OwnedCorrection<f64, SMOOTHER_INPUTS, SIDES>;
 
 impl Learned {
@@ -38,12 +38,12 @@ impl Learned {
         Arc::new(Self { readings: params.readings, filter: Arc::new(filter), smoother: Arc::new(smoother) })
     }
 
-    /// The scale of the features that a filter's correction sees.
+    /// Scale of the features of the past.
     pub(crate) fn past_scale(&self) -> FeatureScale<f64> {
         self.readings.past()
     }
 
-    /// The scale of the features of the future.
+    /// Scale of the features of the future.
     pub(crate) fn future_scale(&self) -> FeatureScale<f64> {
         self.readings.future()
     }

@@ -1,4 +1,4 @@
-//! Filters behind one trait: the kernels of `ohmstrain-ekf` in the instances that a sensor needs.
+//! Filters behind one trait: the estimators of `ohmstrain-ekf`, instantiated for sensors.
 
 mod backward;
 pub(crate) mod build;
@@ -22,7 +22,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::run::turns::Turns;
 
-/// The live filter of a sensor whose number of branches and estimator are known at run time only. Threads and tasks can own it.
+/// Live filter of a sensor whose number of branches and estimator are known only at run time. It can be moved between threads
+/// and tasks.
 pub trait Filter: Send {
     /// Sets the resistance at rest, unstretched, from now on.
     ///
@@ -30,26 +31,27 @@ pub trait Filter: Send {
     /// As [`LiveFilter::rest`](ohmstrain_ekf::live::LiveFilter::rest).
     fn rest(&mut self, measured: f64) -> Result<(), StepError>;
 
-    /// The strain is known now: what was doubted of it is gone.
+    /// Clears the doubts about the strain, which is now known.
     fn settle(&mut self);
 
-    /// Takes the reading `R/R₀ - 1` at `time_s`; `None` if it is missing. The first row takes no time.
+    /// Takes the reading `R/R₀ - 1` at `time_s`; `None` if it is missing. No time passes before the first row.
     ///
     /// # Errors
-    /// See [`StepError`]. The filter stays as it was: the next good row goes on from the last good one.
+    /// See [`StepError`]. The filter is unchanged: the next good row continues from the last good one.
     fn step(&mut self, time_s: f64, reading: Option<Reading<f64>>) -> Result<(), StepError>;
 
-    /// Strain at the last row, within the limits.
+    /// Returns the strain at the last row, within the limits.
     fn strain(&self) -> Gaussian<f64>;
 
-    /// Returns all that is reported about the last row.
+    /// Returns the full output for the last row.
     fn output(&self) -> Output;
 
-    /// Like [`Self::step`], but every row is estimated from the readings up to `lag_s` seconds after it; `out` gets the
-    /// rows that have become due, in order. The cost of a step grows with the rows within the lag, not with time.
+    /// Like [`Self::step`], but every row is estimated from the readings up to `lag_s` seconds after it. `out` receives
+    /// the rows that have become due, in order. The cost of a step grows with the number of rows within the lag, not
+    /// with time.
     ///
     /// # Errors
-    /// See [`StepError`]. The filter stays as it was.
+    /// See [`StepError`]. The filter is unchanged.
     fn step_lagged(
         &mut self,
         time_s: f64,
@@ -58,38 +60,38 @@ pub trait Filter: Send {
         out: &mut dyn FnMut(Output),
     ) -> Result<(), StepError>;
 
-    /// The rows that still wait, from all readings there are.
+    /// Passes the rows still waiting to `out`, estimated from all readings so far.
     ///
     /// # Errors
     /// See [`StepError`].
     fn flush_lagged(&mut self, out: &mut dyn FnMut(Output)) -> Result<(), StepError>;
 
-    /// Stores all that the next row depends on, except the parameters and options that the filter was made of.
+    /// Stores everything on which the next row depends, except the filter's parameters and options.
     ///
     /// # Errors
-    /// If TOML cannot hold it.
+    /// If TOML cannot represent it.
     fn store(&self) -> Result<toml::Table, toml::ser::Error>;
 
-    /// Resumes, to the bit, from the result of [`Self::store`], of a filter made of the same parameters and options.
+    /// Resumes, to the bit, from the result of [`Self::store`] of a filter with the same parameters and options.
     ///
     /// # Errors
-    /// If it is the state of a filter of another kind. The filter stays as it was.
+    /// If it is the state of a filter of another kind. The filter is then unchanged.
     fn resume(&mut self, stored: toml::Table) -> Result<(), toml::de::Error>;
 }
 
 /// Smooths whole recordings with the steps of the live filter.
 pub trait Smoother: Send {
-    /// Filters a recording and goes back through it segment by segment: the way to smooth recordings that are too long to hold
-    /// their states, or their estimates, in memory.
+    /// Filters a recording, and returns the backward pass, segment by segment. Use it for recordings whose states or estimates
+    /// do not fit in memory.
     ///
     /// # Errors
-    /// The row at which a step failed, and why.
+    /// The row at which a step failed, and the reason.
     fn way_back<'a>(&'a mut self, rows: Rows<'a>) -> Result<Box<dyn WayBack + 'a>, (usize, StepError)>;
 
     /// Smooths a whole recording; `None` if the estimator has no smoother.
     ///
     /// # Errors
-    /// The row at which a step failed, and why.
+    /// The row at which a step failed, and the reason.
     fn smooth(
         &mut self,
         time_s: &[f64],
@@ -108,11 +110,11 @@ pub trait Smoother: Send {
     }
 }
 
-/// Rows whose states are in memory at once while a recording is smoothed; the others are computed again. Of a recording of
-/// ten million rows that leaves 2441 states to begin again from, fewer than the rows of one segment.
+/// Number of rows whose states are in memory at once while a recording is smoothed; the others are recomputed. A recording
+/// of ten million rows has 2441 states to restart from, fewer than the rows of one segment.
 const SEGMENT: usize = 4096;
 
-/// Rows of a recording, wherever they are kept.
+/// Rows of a recording, whatever their storage.
 #[derive(Clone, Copy)]
 pub struct Rows<'a> {
     len: usize,
@@ -120,7 +122,7 @@ pub struct Rows<'a> {
 }
 
 impl<'a> Rows<'a> {
-    /// `len` rows; `row` gives time, s, and the reading `R/R₀ - 1` of each, `None` where it is missing.
+    /// Describes `len` rows; `row` returns the time, s, and the reading `R/R₀ - 1` of each, `None` where it is missing.
     #[must_use]
     pub fn new(len: usize, row: &'a dyn Fn(usize) -> (f64, Option<Reading<f64>>)) -> Self {
         Self { len, row }
@@ -132,27 +134,27 @@ impl<'a> Rows<'a> {
         self.len
     }
 
-    /// True if there is none.
+    /// True if there are no rows.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    /// One of them.
+    /// Returns time, s, and reading of a row.
     #[must_use]
     pub fn get(&self, row: usize) -> (f64, Option<Reading<f64>>) {
         (self.row)(row)
     }
 }
 
-/// Way back through a recording. It holds in memory the states of one segment, and a state for each of those
-/// before it.
+/// Backward pass through a recording. It holds in memory the states of one segment, and one state for each earlier
+/// segment.
 pub trait WayBack {
-    /// Smooths the last segment that has not been smoothed yet. `out` then holds its estimates in order of time; what is
-    /// returned are its rows, or `None` once the first row has been smoothed, or if the estimator has no smoother.
+    /// Smooths the last segment that has not been smoothed yet. `out` then holds its estimates in order of time. Returns
+    /// the range of its rows; `None` once the first row has been smoothed, or if the estimator has no smoother.
     ///
     /// # Errors
-    /// The row at which a step failed, and why.
+    /// The row at which a step failed, and the reason.
     fn next_segment(&mut self, out: &mut Vec<Output>) -> Result<Option<Range<usize>>, (usize, StepError)>;
 
     /// Returns the times at which the readings turn.
@@ -170,17 +172,17 @@ pub struct Output {
     pub verdict: ReadingVerdict,
     /// Probabilities of extend, hold and retract; `None` if the estimator has no phases.
     pub phases: Option<[f64; 3]>,
-    /// The reading, R/R₀ - 1 of R₀ as it is followed; `None` if it was missing.
+    /// Reading, R/R₀ - 1 with R₀ as tracked; `None` if it was missing.
     pub reading: Option<Reading<f64>>,
-    /// Flags that doubts raise.
+    /// Flags raised by doubts.
     pub doubts: Flags,
-    /// Relative deviation of R₀, as the filter follows it, from calibration's.
+    /// Relative deviation of R₀, as tracked by the filter, from that of the calibration.
     pub rest_off: f64,
 }
 
 impl Output {
-    /// Widens the estimate of the strain, `stated` before doubts, to a variance, and by as much, on the mean slope, the prediction of
-    /// the reading after a hold.
+    /// Widens the estimate of the strain, `stated` before doubts, to `variance`. The prediction of the reading after a hold is
+    /// widened by the equivalent on the mean slope.
     pub fn widen(&mut self, doubts: &Doubts<f64>, stated: Gaussian<f64>, variance: f64) {
         self.estimate.still_relaxes.variance += doubts.of_reading(variance - stated.variance).max(0.0);
         self.estimate.strain = Gaussian { variance, ..stated };
@@ -192,12 +194,12 @@ impl Output {
 pub enum Start {
     /// The long-run distribution of the calibration.
     Unknown,
-    /// A strain that is known to the limits' resolution, at rest.
+    /// A known strain at rest, exact to a small fraction of the limits' span.
     Strain(f64),
 }
 
 impl Start {
-    /// The strain, if it is known.
+    /// Returns the strain if it is known.
     #[must_use]
     pub const fn strain(self) -> Option<f64> {
         match self {

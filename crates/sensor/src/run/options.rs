@@ -10,12 +10,12 @@ pub struct Options {
     pub start: Start,
     /// Treatment of outliers.
     pub guard: Guard<f64>,
-    /// Protections from what no calibration has seen; of outliers the guard decides.
+    /// Protections from conditions absent from the calibration; the guard handles outliers.
     pub protections: Protections,
 }
 
 impl Options {
-    /// Returns the options of a filter from an unknown strain, without protections.
+    /// Returns the options of a filter that starts from an unknown strain, without protections.
     #[must_use]
     pub fn plain() -> Self {
         Self { start: Start::Unknown, guard: Guard::none(), protections: Protections::NONE }

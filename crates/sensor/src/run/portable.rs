@@ -1,4 +1,4 @@
-//! A filter as plain numbers, for programs that write it in another language.
+//! A filter as plain numbers, for programs that generate it in another language.
 
 use ohmstrain_ekf::correction::{FILTER_INPUTS, FeatureScale};
 use ohmstrain_ekf::live::LiveParts;
@@ -10,16 +10,16 @@ use crate::params::estimator::{EstimatorKind, EstimatorParams};
 use crate::run::build::{HISTORIES, HYPOTHESES};
 use crate::run::learned::Learned;
 
-/// A sensor's filter, with what stands around it.
+/// A sensor's filter, with the components around it.
 #[derive(Clone, Debug)]
 pub struct PortableFilter {
-    /// Filter that moves the state: never [`EstimatorKind::Corrected`].
+    /// Filter that propagates the state: never [`EstimatorKind::Corrected`].
     pub kind: EstimatorKind,
-    /// Number of hypotheses that it keeps; 1 if it keeps none.
+    /// Maximum number of hypotheses; 1 for a single Gaussian.
     pub hypotheses: usize,
     /// Its noise, motion and phases.
     pub estimator: EstimatorParams,
-    /// Its surroundings.
+    /// Components around it.
     pub parts: LiveParts<f64, ()>,
     /// Correction of its strain.
     pub correction: Option<PortableCorrection>,
@@ -30,7 +30,7 @@ pub struct PortableFilter {
 pub struct PortableCorrection {
     /// The scale of the features.
     pub features: FeatureScale<f64>,
-    /// Correction in the form that runs.
+    /// Correction in running form.
     pub learned: OwnedCorrection<f64, FILTER_INPUTS>,
 }
 

@@ -4,8 +4,8 @@ use std::collections::HashMap;
 use ohmstrain_ekf::live::SensorEstimator;
 use ohmstrain_ekf::{Advanced, Estimator, Gaussian, Innovation, Reading, StepError};
 
-/// An estimator that prepares a step once for each length, and may take longer steps than it asks for. Recordings repeat a few
-/// hundred lengths, to a nanosecond: differences of decimal times repeat to rounding only.
+/// An estimator that prepares a step only once for each length, and may take steps longer than its limit. Recordings repeat a
+/// few hundred lengths, because differences of decimal times are equal except for rounding.
 pub(crate) struct Remembering<E, P> {
     estimator: E,
     /// Factor on the longest step of the estimator.
@@ -16,13 +16,13 @@ pub(crate) struct Remembering<E, P> {
 /// Prepared steps.
 struct Prepared<P> {
     steps: Vec<P>,
-    /// The place of a step, by the bits of its length.
+    /// Index of a step by the bits of its length.
     places: HashMap<u64, usize>,
-    /// Length and place of the step used last: at a fixed rate it is the next one, too.
+    /// Length and index of the last step used; at a fixed rate the next step is the same.
     last: Option<(u64, usize)>,
 }
 
-/// A stream whose steps never repeat must not fill the memory.
+/// Maximum number of prepared steps, so that a stream whose steps never repeat does not fill the memory.
 const MOST_PREPARED: usize = 4096;
 
 impl<E, P: Copy> Remembering<E, P> {

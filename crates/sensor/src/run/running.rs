@@ -21,11 +21,11 @@ use crate::run::{Filter, Output};
 /// The live filter on a computer.
 pub(crate) type Live<E, const N: usize, const L: usize> =
     LiveFilter<f64, Remembering<E, <E as Estimator<f64, N, L>>::Prepared>, SharedCorrection, N, L>;
-/// A row of it on the way forward.
+/// Data of a row in the forward pass.
 pub(crate) type LiveStep<E, const N: usize, const L: usize> =
     KeptStep<Remembering<E, <E as Estimator<f64, N, L>>::Prepared>, N, L>;
 
-/// A row, and the step that a smoother needs of it.
+/// A row, and the data of its step that a smoother needs.
 pub(crate) type KeptRow<E, const N: usize, const L: usize> =
     (LiveRow<f64, <E as Estimator<f64, N, L>>::State>, LiveStep<E, N, L>);
 
@@ -39,7 +39,7 @@ impl Correct<f64> for SharedCorrection {
     }
 }
 
-/// A live filter with rows that wait for later readings.
+/// A live filter with rows waiting for later readings.
 pub(crate) struct Running<E: SensorEstimator<f64, N, L>, const B: usize, const N: usize, const L: usize> {
     pub live: Live<E, N, L>,
     pub clock: Clock,
@@ -49,7 +49,7 @@ pub(crate) struct Running<E: SensorEstimator<f64, N, L>, const B: usize, const N
     /// The last row.
     last: Option<LiveRow<f64, E::State>>,
     pending: VecDeque<Pending<E, N, L>>,
-    /// Estimates on their way out, newest first.
+    /// Estimates to be emitted, newest first.
     due: Vec<Output>,
 }
 
@@ -67,7 +67,7 @@ pub(crate) struct Reports<const B: usize, const N: usize> {
 }
 
 impl<const B: usize, const N: usize> Reports<B, N> {
-    /// The report of a state, before any correction.
+    /// Returns the output for a state, before any correction.
     pub(crate) fn row<S: State<f64, N, L>, const L: usize>(
         &self,
         state: &S,
@@ -97,7 +97,8 @@ pub(crate) struct Pending<E: SensorEstimator<f64, N, L>, const N: usize, const L
 #[derive(Clone, Copy)]
 pub(crate) struct Reported {
     pub measured: Measured<f64>,
-    /// The corrected strain before doubts, and how much larger innovations had been than stated; `None` without a correction.
+    /// The corrected strain before doubts, and the ratio of observed to stated innovation variance; `None` without a
+    /// correction.
     pub corrected: Option<(Gaussian<f64>, f64)>,
     pub doubts: Doubts<f64>,
     pub rest_off: f64,
@@ -125,7 +126,7 @@ where
         Self { live, clock: Clock::default(), reports, learned, last: None, pending, due }
     }
 
-    /// The next row. Never inlined: a program has it once for each estimator and size.
+    /// Takes the next row. Never inlined, so that a program contains it once for each estimator and size.
     #[inline(never)]
     pub(crate) fn row(
         &mut self,
@@ -141,7 +142,7 @@ where
         Ok(row)
     }
 
-    /// The next row, and what a smoother needs of it.
+    /// Takes the next row, and returns the data that a smoother needs as well.
     pub(crate) fn kept_row(
         &mut self,
         time_s: f64,
@@ -182,8 +183,8 @@ where
         }
     }
 
-    /// Returns the output of a row given later readings: mixed with its first estimate if there is a correction, and with the
-    /// doubts of that time.
+    /// Returns the output of a row given later readings. If there is a correction, it is mixed with the row's first estimate.
+    /// The doubts are those of the row's time.
     fn lagged_row(&self, state: &E::State, reported: &Reported) -> Output {
         let scale = self.reports.filtered_scale.max(self.reports.smoothed_scale);
         let mut output = self.reports.row(state, &reported.measured, scale);
@@ -198,7 +199,7 @@ where
         output
     }
 
-    /// Hands out the first `count` of the rows that wait, given everything up to the state `last`.
+    /// Emits the first `count` waiting rows, smoothed from the state `last`.
     fn emit(&mut self, count: usize, last: E::State, out: &mut dyn FnMut(Output)) -> Result<(), StepError> {
         let mut due = mem::take(&mut self.due);
         let mut back = Backward::new(last);
@@ -225,7 +226,8 @@ where
         if smoothed? { Ok(()) } else { Err(StepError::NoSmoother) }
     }
 
-    /// The state after a row, before the filter looked again: nothing leads back over a hypothesis that comes from nowhere.
+    /// Returns the state after a row, before a second look of the filter: no backward step exists over its newly created
+    /// hypothesis.
     fn state_after(&self, measured: &Measured<f64>, row: &LiveStep<E, N, L>) -> Result<E::State, StepError> {
         match row {
             KeptStep::Read(step) if measured.jumped.is_some() => {
@@ -276,7 +278,7 @@ where
         lag_s: f64,
         out: &mut dyn FnMut(Output),
     ) -> Result<(), StepError> {
-        // Rows that fall due before this reading was taken do not get to see it.
+        // Rows due before the time of this reading are estimated without it.
         let overdue = self.pending.partition_point(|row| row.time_s + lag_s < time_s);
         let now = self.live.state().clone();
         self.emit(overdue, now, out)?;
@@ -287,7 +289,7 @@ where
         let reported =
             Reported { measured: row.measured, corrected, doubts: *self.live.doubts(), rest_off: self.live.rest_off() };
         self.pending.push_back(Pending { time_s, reported, row: step });
-        // No row waits for what comes after a jump.
+        // No row waits for readings after a jump.
         let jumped = row.measured.jumped.is_some();
         let due = self.pending.partition_point(|row| jumped || row.time_s + lag_s <= time_s);
         self.last = Some(row);

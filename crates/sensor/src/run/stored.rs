@@ -11,8 +11,8 @@ use crate::run::clock::Clock;
 use crate::run::remembering::Remembering;
 use crate::run::running::{LiveStep, Pending, Reported};
 
-/// State that the next row depends on. Prepared steps are not in it: they follow from their lengths. Estimators' states are TOML already:
-/// a program would have all of this once for each type of them.
+/// State on which the next row depends. Prepared steps are not stored, because they follow from their lengths. States of estimators
+/// are already TOML here; otherwise a program would contain this code once for each state type.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Stored {
@@ -33,7 +33,7 @@ pub(crate) struct Waiting {
     rest_off: f64,
     /// The step to a reading that was used.
     read: Option<StoredStep>,
-    /// The state that is predicted at a row without one, and the whole steps of the pause.
+    /// The predicted state at a row without a reading, and the whole steps of the pause.
     predicted: Option<Value>,
     whole: Option<StoredStep>,
 }
@@ -45,7 +45,7 @@ struct Corrected {
     birge: f64,
 }
 
-/// A step: where it started, how long it was and what was read at its end.
+/// A step: the state at its start, its length, and the reading at its end.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct StoredStep {
@@ -84,7 +84,7 @@ impl Waiting {
         Ok(Self { time_s: pending.time_s, measured, corrected, doubts, rest_off, read, predicted, whole })
     }
 
-    /// The row, with steps as this estimator prepares them.
+    /// Restores the row, with steps prepared by this estimator.
     pub(crate) fn pending<E, const N: usize, const L: usize>(
         self,
         estimator: &Substeps<Remembering<E, E::Prepared>>,

@@ -1,10 +1,10 @@
 use ohmstrain_ekf::live::TurnWatch;
 
-/// Times at which the readings of a recording turn, as a filter took them; its first and last reading among them.
+/// Times, s, at which the readings used by a filter turn, including the first and last reading of a recording.
 #[derive(Debug, Default)]
 pub struct Turns {
     at_s: Vec<f64>,
-    /// Time of the last reading, and how long readings had not turned then, s.
+    /// Time of the last reading, and the time since the last turn at that moment, s.
     last: Option<(f64, f64)>,
 }
 
@@ -12,12 +12,12 @@ pub struct Turns {
 const ROUNDING: f64 = 1e-9;
 
 impl Turns {
-    /// Takes a reading that was used, at a time, s, and what a filter's watch says after it.
+    /// Takes the time, s, of a reading that was used, and the state of the filter's turn watch after it.
     pub(crate) fn see(&mut self, time_s: f64, watch: &TurnWatch<f64>) {
         let unturned_s = watch.since_turn_s();
         match self.last {
             None => self.at_s.push(time_s),
-            // The watch begins anew after a pause.
+            // The watch restarts after a pause.
             Some((last_s, _)) if unturned_s == 0.0 && time_s > last_s => self.at_s.extend([last_s, time_s]),
             Some((last_s, before_s)) if unturned_s < (before_s + time_s - last_s) * (1.0 - ROUNDING) => {
                 self.at_s.push(time_s - unturned_s);
@@ -31,7 +31,7 @@ impl Turns {
     #[must_use]
     pub fn around(&self, time_s: f64) -> f64 {
         let Some((last_s, _)) = self.last else { return 0.0 };
-        // What comes before the first reading, or after the last, belongs to the nearest turn.
+        // Times before the first reading, or after the last, belong to the nearest interval between turns.
         let turns = self.at_s.len();
         let next = self.at_s.partition_point(|at_s| *at_s <= time_s).max(1);
         let next = if time_s < last_s { next } else { turns };
@@ -46,7 +46,7 @@ mod tests {
 
     use super::Turns;
 
-    /// Up until 4 s, down until 6 s, half a minute of nothing, and up until 40 s.
+    /// Readings rise until 4 s, fall until 6 s, are missing for half a minute, and rise until 40 s.
     #[test]
     fn rows_lie_between_the_turns_around_them() {
         let (mut watch, mut turns) = (TurnWatch::new(TurnSeen { turn: 0.05, longest_s: 20.0 }), Turns::default());

@@ -11,17 +11,18 @@ use crate::run::running::{LiveStep, Running};
 use crate::run::turns::Turns;
 use crate::run::{Output, Rows, SEGMENT, Smoother, WayBack};
 
-/// The way back through a recording: segments but the last are filtered once more, from the state before their first rows.
+/// The backward pass through a recording: all segments but the last are filtered again, from the state before their first
+/// row.
 pub(crate) struct Segments<'a, E: SensorEstimator<f64, N, L>, const B: usize, const N: usize, const L: usize> {
     running: &'a mut Running<E, B, N, L>,
     rows: Rows<'a>,
-    /// Filter's state before the first row of each segment that is not smoothed yet.
+    /// Filter's state before the first row of each segment not yet smoothed.
     starts: Vec<(Clock, Memory<f64, E::State>)>,
-    /// The way back over those that are.
+    /// Backward pass over the segments already smoothed.
     back: Backward<E::State>,
-    /// The present segment.
+    /// Steps of the current segment.
     steps: Vec<(Measured<f64>, LiveStep<E, N, L>)>,
-    /// True if that is the last segment, whose steps are there already.
+    /// True if it is the last segment, whose steps are already available.
     is_last: bool,
     /// Turns of all readings.
     turns: Turns,
@@ -57,7 +58,8 @@ where
     }
 }
 
-/// Filters a segment from where the filter is, and keeps its steps; `after` is called with time, s, and result of each.
+/// Filters a segment from the current state, and keeps its steps; `after` is called with the time, s, and the result of
+/// each.
 fn steps_of<E: SensorEstimator<f64, N, L>, const B: usize, const N: usize, const L: usize>(
     running: &mut Running<E, B, N, L>,
     rows: Rows<'_>,

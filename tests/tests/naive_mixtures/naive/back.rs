@@ -1,16 +1,16 @@
-//! The way back through a filter of hypotheses, written down naively.
+//! Naive smoother of a filter of hypotheses.
 
 use nalgebra::{SMatrix, SVector};
 use ohmstrain_model::{Direction, Transition};
 
 use super::{Hypotheses, Hypothesis, Moments, Naive, Rule, moments};
 
-/// Weight, mean and covariance given all readings.
+/// Smoothed weight, mean and covariance.
 pub type Smoothed<const N: usize> = (f64, SVector<f64, N>, SMatrix<f64, N, N>);
 
 impl<const B: usize, const N: usize> Naive<B, N> {
-    /// The hypotheses before a step given all readings: those that were filtered, those that the step made of them, and the
-    /// same ones given all readings.
+    /// Returns the smoothed hypotheses before a step, from the filtered ones, those after the step, and the smoothed ones
+    /// after the step.
     pub fn back<const L: usize>(
         &self,
         filtered: &Hypotheses<N>,
@@ -34,8 +34,8 @@ impl<const B: usize, const N: usize> Naive<B, N> {
     }
 }
 
-/// Rauch, Tung & Striebel: what is known before a step from what is known after it. States that are known exactly, as the rate
-/// of a hold, say nothing.
+/// Takes a Rauch-Tung-Striebel step from the smoothed state after a step to that before it. Exactly known states, such as the
+/// rate of a hold, carry no information.
 fn retraced<const N: usize>(
     before: &Moments<N>,
     jacobian: &SMatrix<f64, N, N>,
@@ -45,7 +45,7 @@ fn retraced<const N: usize>(
     let per_sd = SMatrix::<f64, N, N>::from_diagonal(
         &predicted.1.diagonal().map(|variance| if variance > 0.0 { 1.0 / variance.sqrt() } else { 0.0 }),
     );
-    // A dynamic matrix: the decomposition is not there for one whose size is a parameter.
+    // A dynamic matrix, because the decomposition is not available for a generic size.
     let correlation = per_sd * predicted.1 * per_sd;
     let inverse = nalgebra::DMatrix::from_column_slice(N, N, correlation.as_slice()).pseudo_inverse(1e-11).unwrap();
     let inverse = per_sd * SMatrix::<f64, N, N>::from_column_slice(inverse.as_slice()) * per_sd;
@@ -53,7 +53,7 @@ fn retraced<const N: usize>(
     (before.0 + gain * (after.0 - predicted.0), before.1 + gain * (after.1 - predicted.1) * gain.transpose())
 }
 
-/// Kim's smoother over hypotheses that were merged: each goes back to all whose children it is made of, with their shares.
+/// Runs Kim's smoother over merged hypotheses: each leads back to the parents of all its children, with their shares.
 fn through<const N: usize>(
     filtered: &[Hypothesis<N>],
     heirs: &[Hypothesis<N>],
@@ -67,14 +67,14 @@ fn through<const N: usize>(
             if share <= 1e-7 {
                 continue;
             }
-            // The heir is the child and noise of the size of their distance.
+            // The merged hypothesis is the child plus noise of the size of their distance.
             let apart = heir.mean - child.posterior.0;
             let merged = (heir.mean, child.posterior.1 + apart * apart.transpose());
             let own = retraced(&child.posterior, &SMatrix::identity(), &merged, &(*mean, *covariance));
             let parent = &filtered[child.parent];
             let here = (parent.mean, parent.covariance);
             let back = retraced(&here, &child.jacobian, &child.predicted, &own);
-            // What no later reading can have told is an error of merging.
+            // A change beyond any possible information of later readings is an error of merging.
             let astray = (0..N).any(|i| {
                 let variance = here.1[(i, i)];
                 !(back.1[(i, i)] <= 4.0 * variance && (back.0[i] - here.0[i]).powi(2) <= 400.0 * variance)

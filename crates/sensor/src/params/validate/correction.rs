@@ -10,7 +10,7 @@ use crate::params::correction::{
 };
 use crate::params::estimator::EstimatorKind;
 
-/// Training rows that a file may have.
+/// Number of training rows that a file may have.
 const ROWS: std::ops::RangeInclusive<usize> = 2..=1000;
 
 impl CorrectionParams {
@@ -49,7 +49,7 @@ impl CorrectionScale {
     /// Checks every number.
     ///
     /// # Errors
-    /// Names the first that is outside of its range.
+    /// Names the first number outside its range.
     pub fn validate(&self, table: &Table) -> Result<(), FieldError> {
         table.number("centre", self.centre, SIGNED)?;
         table.number("half_range", self.half_range, POSITIVE)?;
@@ -100,7 +100,7 @@ impl InputScales {
 }
 
 impl ProcessParams {
-    /// Checks a process that may use these inputs, and must use one of them first.
+    /// Checks a process that may use inputs in the given range, and whose first input must be `first`, if given.
     fn validate(
         &self,
         table: &Table,
@@ -140,7 +140,7 @@ impl TrainingRow {
     /// Checks every number.
     ///
     /// # Errors
-    /// Names the first that is outside of its range.
+    /// Names the first number outside its range.
     pub fn validate(&self, table: &Table) -> Result<(), FieldError> {
         table.number("time_s", self.time_s, SIGNED)?;
         table.number("strain", self.strain, SIGNED)?;

@@ -1,8 +1,8 @@
-//! Ranges of numbers in parameter files, and the names of what is outside of its range.
+//! Ranges of numbers in parameter files, and errors that name a number outside its range.
 
 use thiserror::Error;
 
-/// A number in a sensor's parameters that no sensor can have.
+/// A number in a sensor's parameters outside its valid range.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("field `{field}`: expected {expected}, found {found}")]
 pub struct FieldError {
@@ -29,22 +29,22 @@ impl Allowed {
     }
 }
 
-/// Strains, degrees, coefficients: far beyond what sensors have, and near enough for squares and products of some
-/// of them to be numbers.
+/// Strains, degrees, coefficients: far beyond those of real sensors, yet small enough that squares and products stay
+/// finite.
 pub const SIGNED: Allowed = Allowed { least: -1e9, most: 1e9 };
 /// Range of a branch's gain per strain, relative to R₀.
 pub const GAIN: Allowed = Allowed { least: -LARGEST_CHANGE, most: LARGEST_CHANGE };
 /// Resistances, times, rates, lengths. The search for noise and motion ends between `e^-25` and `e^15`.
 pub const POSITIVE: Allowed = Allowed { least: 1e-12, most: 1e12 };
-/// Rates, 1/s: squares of what is faster leave no digits to a belief, and the search ends far below.
+/// Rates, 1/s: squares of faster rates leave no digits in a belief, and the search ends far below.
 pub const RATE: Allowed = Allowed { least: 1e-12, most: 1e8 };
-/// Deviations of the strain, likewise.
+/// Standard deviations of the strain, limited for the same reason.
 pub const SPREAD: Allowed = Allowed { least: 1e-12, most: 1e6 };
-/// Deviations of what may be exact.
+/// Standard deviations that may be zero.
 pub const AMOUNT: Allowed = Allowed { least: 0.0, most: 1e6 };
 /// Probabilities and powers.
 pub const SHARE: Allowed = Allowed { least: 0.0, most: 1.0 };
-/// Factors on standard deviations: what calibration finds lies between 1 and 5.
+/// Factors on standard deviations; calibration yields 1 to 5.
 pub const FACTOR: Allowed = Allowed { least: 1e-3, most: 1e3 };
 /// Weights of training rows, and entries of matrices made of them.
 pub const WEIGHT: Allowed = Allowed { least: -1e15, most: 1e15 };
@@ -53,10 +53,10 @@ pub const TOLD: Allowed = Allowed { least: -f64::INFINITY, most: f64::INFINITY }
 /// Number for information only, zero or more.
 pub const TOLD_AMOUNT: Allowed = Allowed { least: 0.0, most: f64::INFINITY };
 
-/// Largest change of resistance, relative to R₀, that a gauge curve may tell within the law's range.
+/// Largest change of resistance, relative to R₀, of a gauge curve within the law's range.
 pub const LARGEST_CHANGE: f64 = 1e6;
 
-/// A table of the file by the path that leads to it.
+/// A table of the file, identified by its path.
 pub struct Table(String);
 
 impl Table {
@@ -90,7 +90,7 @@ impl Table {
         FieldError { field: self.path(name), expected: expected.into(), found: found.to_string() }
     }
 
-    /// The error of several of its numbers together.
+    /// The error of several numbers of the table together.
     pub fn wrong_itself(&self, expected: String, found: String) -> FieldError {
         FieldError { field: self.0.clone(), expected, found }
     }
@@ -98,7 +98,7 @@ impl Table {
     /// Checks that a number is allowed.
     ///
     /// # Errors
-    /// Names the field, if not.
+    /// Names the field if not.
     pub fn number(&self, name: &str, value: f64, allowed: Allowed) -> Result<(), FieldError> {
         if allowed.contains(value) {
             return Ok(());
@@ -112,7 +112,7 @@ impl Table {
     /// # Errors
     /// Names the field, if not.
     pub fn numbers(&self, name: &str, values: &[f64], allowed: Allowed) -> Result<(), FieldError> {
-        // A filter's thousands of numbers are checked whenever one is built: they get names only where one is wrong.
+        // Thousands of numbers are checked whenever a filter is built; names are formatted only for a wrong one.
         let wrong = values.iter().enumerate().find(|(_, value)| !allowed.contains(**value));
         wrong.map_or(Ok(()), |(index, value)| self.number(&format!("{name}[{index}]"), *value, allowed))
     }
@@ -126,7 +126,7 @@ impl Table {
     }
 }
 
-/// A number in few characters.
+/// Formats a number in few characters.
 pub fn short(value: f64) -> String {
     let plain = value == 0.0 || !value.is_finite() || (1e-4..1e6).contains(&value.abs());
     if plain { value.to_string() } else { format!("{value:e}") }

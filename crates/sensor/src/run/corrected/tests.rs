@@ -63,7 +63,7 @@ impl WayBack for FakeBack {
     }
 }
 
-/// Low-passes start a third of the way to the middle.
+/// Low-passes start a third of the way from the reading to the centre.
 const STARTS: Starts<f64> = [[0.0, 0.67]; 6];
 const SCALE: CorrectionScale = CorrectionScale { centre: 0.25, half_range: 0.3, rates: [0.02, 0.05], starts: STARTS };
 
@@ -106,7 +106,7 @@ fn params() -> CorrectionParams {
         filtered: outputs(&says(time_s[k], 0.0, ReadingVerdict::Accepted)),
         smoothed: outputs(&says(time_s[k], 0.0, ReadingVerdict::Accepted)),
     };
-    // Weights that nobody has learned: what is bare_row of a row is a smooth function of all its inputs.
+    // Artificial weights: the estimate of a row is a smooth function of all its inputs.
     let weights = |rows: usize| (0..rows).map(|k| 0.01 * (1.3 * k as f64).sin()).collect();
     let process = |length: f64, inputs: Vec<usize>| ProcessParams {
         sd_scale: 1.2,
@@ -193,7 +193,8 @@ fn segments_say_what_the_whole_recording_says() {
             expected.variance += bare_row.estimate.strain.variance - 1e-4;
         }
         let strain = smoothed[k].estimate.strain;
-        // The low-passes of thousands of rows begin anew from what was kept: to the last bit, but for the growth.
+        // The low-passes restart after thousands of rows from the stored state: equal to the last bit, except for the
+        // growth.
         assert!(strain.mean == expected.mean && (strain.variance - expected.variance).abs() < 1e-15, "{k}");
         assert_eq!((smoothed[k].nis, smoothed[k].phases), (bare_row.nis, bare_row.phases));
     }
@@ -234,8 +235,8 @@ fn live(learned: Option<&Arc<Learned>>, gate: Option<f64>) -> Box<dyn Filter> {
     FilterParts::of_law(EstimatorKind::Ekf, &law, estimator, LIMITS).with(options).filter(learned).unwrap()
 }
 
-/// Rows at 8 Hz, whose times no clock rounds. They begin without a reading; later readings are missing one by one
-/// and for seconds; two are outliers.
+/// Rows at 8 Hz, whose times are exact in binary. They begin without a reading; later readings are missing singly and
+/// for seconds; two are outliers.
 fn broken_recording() -> Vec<(f64, Option<Reading<f64>>)> {
     let row = |k: u32| {
         let time_s = 0.125 * f64::from(k);
@@ -246,8 +247,9 @@ fn broken_recording() -> Vec<(f64, Option<Reading<f64>>)> {
     (0..600).map(row).collect()
 }
 
-/// Compares a corrected filter with the bare one beside it: where a reading is missing, or rejected, the features stay and the
-/// variance grows with the filter's; innovations of earlier rows, fading with 20 s, widen it, in the naive sum.
+/// Compares a corrected filter with the bare filter and a naive correction. Where a reading is missing or rejected, the
+/// features stay and the variance grows with the filter's. Innovations of earlier rows, fading with 20 s, widen it; here they
+/// are summed naively.
 #[test]
 fn a_corrected_filter_says_what_the_bare_one_beside_it_and_its_readings_say() {
     let learned = Learned::new(&params(), LIMITS);
@@ -268,7 +270,7 @@ fn a_corrected_filter_says_what_the_bare_one_beside_it_and_its_readings_say() {
         if seen.is_some() {
             known = Some(filtered.variance);
         }
-        // The first innovation has no interval before it, and a row does not know of its own.
+        // The first innovation has no interval before it, and a row's own innovation does not count.
         let share = |k: usize| 1.0 - (-(innovations[k].0 - innovations[k - 1].0) / 20.0).exp();
         let last = innovations.last().map_or(0.0, |last| last.0);
         let fading = |k: usize| (-(last - innovations[k].0) / 20.0).exp();
@@ -292,7 +294,7 @@ fn a_corrected_filter_says_what_the_bare_one_beside_it_and_its_readings_say() {
 }
 
 /// Tests that with a fixed lag every row comes out once and in order, mixed with its first estimate, whatever rows were
-/// refused in between.
+/// rejected in between.
 #[test]
 fn a_lagged_row_is_mixed_with_what_was_said_of_it() {
     let learned = Learned::new(&params(), LIMITS);
@@ -319,8 +321,8 @@ fn a_lagged_row_is_mixed_with_what_was_said_of_it() {
     assert_eq!(out.iter().map(|output| output.estimate.strain).collect::<Vec<_>>(), expected);
 }
 
-/// Phase histories take steps of no more than a fiftieth of the shortest phase, fifteen between rows of 0.3 s. Four times as long they
-/// leave other digits, and the strain well within its interval; with a factor of 1 every bit stays.
+/// Phase histories take steps of at most a fiftieth of the shortest phase, fifteen between rows of 0.3 s. With steps four times as
+/// long, digits change but the strain stays well within its interval; with a factor of 1 the result is bit-identical.
 #[test]
 fn longer_steps_between_readings_change_little() {
     let (law, estimator) = law_and_estimator();
