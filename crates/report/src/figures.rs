@@ -138,6 +138,10 @@ pub fn draw_strain(chart: &mut Chart, recording: &PlottedRecording, rows: Range<
         (time, recording.shown(lower), recording.shown(upper))
     });
     chart.band(Ink::FILTER_BAND, "filter, 95 % interval", band);
+    if recording.truth.is_some() {
+        let fixed = recording.reading.iter().skip(skipped).map(|reading| recording.static_strain(*reading));
+        chart.line(Ink::STATIC_STRAIN, "static cubic", times().zip(fixed.map(|x| recording.shown(x))));
+    }
     let truth = recording.truth.unwrap_or(&[]).iter().skip(skipped);
     chart.line(Ink::TRUTH, "reference", times().zip(truth.map(|x| recording.shown(*x))));
     chart.line(Ink::FILTER, "filter", times().zip(filtered().map(mean)));

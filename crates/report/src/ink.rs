@@ -42,6 +42,8 @@ impl Ink {
     pub const CURVE: Self = Self::line((0x00, 0x7A, 0x5B), "green", 2.2);
     /// The static calibration.
     pub const STATIC: Self = Self::dashed((0xA3, 0x3B, 0x7A), "purple", 2.2, &[7, 3]);
+    /// Strain by the static calibration, against time.
+    pub const STATIC_STRAIN: Self = Self::dashed((0xA3, 0x3B, 0x7E), "purple", 1.2, &[3, 3]);
     /// The course of time, from the first fifth to the last.
     pub const TIMES: [Self; 5] = [
         Self::line((0xC9, 0xA2, 0x27), "time-1", 1.1),
@@ -112,6 +114,7 @@ impl Ink {
             Self::LAW_BAND,
             Self::CURVE,
             Self::STATIC,
+            Self::STATIC_STRAIN,
             Self::ARROWS,
             Self::BEGUN,
             Self::ENDED,

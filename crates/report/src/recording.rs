@@ -117,6 +117,12 @@ impl<'a> PlottedRecording<'a> {
         (0..=CURVE_POINTS).map(|i| (self.params.static_cubic.strain(at(i)), at(i))).collect()
     }
 
+    /// Returns the strain by the static calibration, within its range; NaN without a reading.
+    pub fn static_strain(&self, reading: f64) -> f64 {
+        let cubic = self.params.static_cubic;
+        cubic.strain(reading).clamp(cubic.range.lower, cubic.range.upper)
+    }
+
     /// Returns the axis label of the readings.
     pub fn reading_label(&self) -> &'static str {
         match self.params.reading {
