@@ -6,7 +6,8 @@
 #                             deb      the same as a Debian package
 #                             wheel    the Python package, which brings the program, for glibc 2.17 and for musl
 #                             npm      the package for browsers and Node, and the page (web.sh)
-#                             c        an exported filter of a simulated sensor as an Arduino library, for C compilers too
+#                             c        the library for programs in C, static and shared, which reads a sensor when it runs; and an
+#                                      exported filter of a simulated sensor as an Arduino library
 #                             crates   a .crate file for each crate, each built from what is in it
 #                             check    licences and advisories of dependencies (deny.toml), and whether the program compiles with the
 #                                      oldest Rust, for Windows and for macOS
@@ -188,10 +189,42 @@ npm() {
     made "$out/ohmstrain-page.html" "a browser"
 }
 
-# The example sensor's filter: an Arduino library, and C that any compiler takes.
+# The library for programs in C, linked by zig on Linux so that it runs with glibc 2.17.
+library() {
+    local folder name=ohmstrain-c-$version-$host built=${CARGO_TARGET_DIR:-target}/release clean start
+    if [[ $host == *-linux-gnu ]]; then
+        tools
+        PATH=$tools/bin:$PATH cargo-zigbuild build --quiet --locked --release -p ohmstrain-c --target "$host.2.17"
+        built=${CARGO_TARGET_DIR:-target}/$host/release
+    else
+        cargo build --quiet --locked --release -p ohmstrain-c
+    fi
+    folder=$(mktemp -d)
+    mkdir -p "$folder/$name/lib"
+    cp -r crates/c/include crates/c/examples crates/c/README.md LICENSE-MIT LICENSE-APACHE "$folder/$name"
+    cp crates/ohmstrain/examples/sensor.toml "$folder/$name/examples"
+    cp "$built"/libohmstrain_c.{a,so,dylib} "$folder/$name/lib" 2>/dev/null || true
+    tar -C "$folder" -czf "$out/$name.tar.gz" "$name"
+    clean=$(mktemp -d)
+    tar -C "$clean" -xzf "$out/$name.tar.gz"
+    start=$SECONDS
+    (
+        cd "$clean/$name/examples"
+        cc -std=c99 -O2 filter.c -I../include ../lib/libohmstrain_c.a -lm -lpthread -ldl -o filter
+        printf 'time_s,resistance_ohm\n0.00,1600\n0.05,1632\n0.10,1680\n' >readings.csv
+        [[ $(./filter sensor.toml readings.csv | wc -l) -eq 4 ]] || die "the library for C filtered nothing"
+        cc -std=c99 -O2 filter.c -I../include -L../lib -lohmstrain_c -lm -o shared
+        [[ $(LD_LIBRARY_PATH=../lib ./shared sensor.toml readings.csv | wc -l) -eq 4 ]] || die "the shared library filtered nothing"
+    )
+    made "$out/$name.tar.gz" "$(glibc "$(echo "$folder/$name/lib"/*.so)"), a C99 compiler" $((SECONDS - start))
+    rm -rf "$clean" "$folder"
+}
+
+# The library, and the example sensor's filter: an Arduino library, and C that any compiler takes.
 c() {
+    library
     program
-    local clean file=$out/ohmstrain-c-$version.zip start
+    local clean file=$out/ohmstrain-arduino-$version.zip start
     clean=$(mktemp -d)
     "$folder/ohmstrain" -q export --sensor crates/ohmstrain/examples/sensor.toml --target c --dt-s 0.05 -o "$clean/ohmstrain" >/dev/null
     rm -f "$file"

@@ -3,8 +3,8 @@
 
 scripts/site-book.py FOLDER
 
-Links to pages and pictures stay as they are; those to other files of the repository lead to its host. `scripts/site.sh`
-builds the book.
+Links to pages and pictures stay as they are; those to other files of the repository lead to its host. A link to a file or a
+heading that does not exist is an error. `scripts/site.sh` builds the book.
 """
 
 import os
@@ -13,6 +13,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -40,19 +41,36 @@ def relinked(text, page, kept):
 
     def link(found):
         to = found[2]
-        if re.match(r"[a-z]+:|#", to):
+        if re.match(r"[a-z]+:", to):
+            return found[0]
+        if to.startswith("#") and to[1:] not in anchors(page):
+            sys.exit(f"{page}: expected a heading of this page, found a link to {to}")
+        if to.startswith("#"):
             return found[0]
         path, _, anchor = to.partition("#")
         name = os.path.normpath(os.path.join(os.path.dirname(page), path))
-        if name == "guide/src/SUMMARY.md":
-            name, path = "guide/src/record.md", path.replace("SUMMARY.md", "record.md")
-        if name in kept or name.endswith((".png", ".svg")):
-            return found[1] + path + ("#" + anchor if anchor else "") + found[3]
         if not (ROOT / name).exists():
             sys.exit(f"{page}: expected a file of the repository, found a link to {to}")
+        if anchor and name.endswith(".md") and anchor not in anchors(name):
+            sys.exit(f"{page}: expected a heading of {name}, found a link to {to}")
+        if name == "guide/src/SUMMARY.md":
+            name, path = "guide/src/record.md", path.replace("SUMMARY.md", "record.md")
+        # mdBook writes README.md as index.html, and links to it as they are.
+        path = re.sub(r"(^|/)README\.md$", r"\1index.html", path) if name in kept else path
+        if name in kept or name.endswith((".png", ".svg")):
+            return found[1] + path + ("#" + anchor if anchor else "") + found[3]
         return found[1] + HOST + name + found[3]
 
     return LINK.sub(link, text)
+
+
+@cache
+def anchors(page):
+    """Anchors of a page's headings, as hosts and mdBook make them, and those that are written out."""
+    text = re.sub(r"^```.*?^```", "", (ROOT / page).read_text(), flags=re.M | re.S)
+    headings = [re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", heading) for heading in re.findall(r"^#+ (.+?)\s*$", text, re.M)]
+    slugs = [re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings]
+    return {*slugs, *re.findall(r'<a (?:id|name)="([^"]+)"', text)}
 
 
 def title(page):
@@ -100,7 +118,7 @@ def main(folder):
         shutil.copy(picture, source / "docs")
     (source / "api.md").write_text(api())
     (source / "SUMMARY.md").write_text(summary(kept))
-    (folder / "book.toml").write_text('[book]\ntitle = "ohmstrain"\nlanguage = "en"\n')
+    (folder / "book.toml").write_text('[book]\ntitle = "ohmstrain"\nlanguage = "en"\n\n[output.html.print]\nenable = false\n')
 
 
 if len(sys.argv) != 2:

@@ -160,6 +160,11 @@ struct Readme;
 #[doc = include_str!("../../docs/library.md")]
 struct Library;
 
+/// The first program on the page about Kalman filters compiles and runs.
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/kalman.md")]
+struct Kalman;
+
 /// And the code in the architecture document.
 #[cfg(doctest)]
 #[doc = include_str!("../../ARCHITECTURE.md")]

@@ -19,7 +19,7 @@ pub enum Gauge<T> {
         decay_strain: T,
     },
     /// `(1 + C ε) exp(A ε + W ε²) - 1`: tunnelling between particles whose gap grows with strain
-    /// (Zhang, Pan, Zheng, Yi, *J. Appl. Polym. Sci.* 2000, with the exponent in powers of strain).
+    /// (Zhang, Pan, Zheng & Yi, *J. Polym. Sci. B* 38 (2000) 2739, with the exponent in powers of strain).
     Tunnelling {
         /// Growth C of the gap, 1 + C ε > 0.
         gap: T,

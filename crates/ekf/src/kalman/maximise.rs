@@ -75,9 +75,10 @@ const CURVATURE_STEP: f64 = 1.2e-4;
 ///   or a NaN marks a θ that is not allowed.
 ///
 /// Derivatives are central differences, with steps of ∛ε for the gradient and ∜ε for the curvature, times the parameter if
-/// it is larger than one. Standard errors are accurate to about six digits. An iteration takes 2 P (P + 1) evaluations, and
-/// one per damping tried. The standard error of a function g(θ) is |g′(θ)| times that of θ; for a variance e^θ the factor is
-/// e^θ.
+/// it is larger than one. Standard errors are accurate to about six digits. One that is huge marks a parameter that the
+/// readings do not determine, such as the logarithm of a variance whose best value is zero. An iteration takes
+/// 2 P (P + 1) evaluations, and one per damping tried. The standard error of a function g(θ) is |g′(θ)| times that of θ;
+/// for a variance e^θ the factor is e^θ.
 ///
 /// # Errors
 /// See [`NoMaximum`].

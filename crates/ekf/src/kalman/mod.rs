@@ -49,7 +49,7 @@
 //! - **Fitting**: [`maximise`] maximises the sum of [`Step::log_likelihood`], and returns standard errors.
 //! - **Late readings**: [`Rewind`].
 //!
-//! `examples/` has six programs of forty lines at most: `constant_velocity`, `pendulum`, `nile`, `two_rates`,
+//! `examples/` has six programs of at most forty lines for users' models: `constant_velocity`, `pendulum`, `nile`, `two_rates`,
 //! `late_reading` and `noise_of_a_model`; `docs/kalman.md` in the repository compares four of them with other
 //! libraries.
 //!

@@ -33,7 +33,8 @@ pub fn smooth<T: Scalar, const N: usize, const M: usize>(
 }
 
 /// Returns the state at the first step of a window given all readings of the window (fixed-lag smoother). A recording
-/// is `steps.windows(lag + 1).map(smooth_first)`; a live filter keeps its last `lag + 1` steps.
+/// is `steps.windows(lag + 1).map(smooth_first)`, and the last `lag` states are those of [`smooth`] over the last window; a
+/// live filter keeps its last `lag + 1` steps.
 ///
 /// # Errors
 /// [`KalmanError::Length`] for an empty window, [`KalmanError::NonFiniteState`].
