@@ -191,7 +191,7 @@ npm() {
 
 # The library for programs in C, linked by zig on Linux so that it runs with glibc 2.17.
 library() {
-    local folder name=ohmstrain-c-$version-$host built=${CARGO_TARGET_DIR:-target}/release clean start
+    local packed name=ohmstrain-c-$version-$host built=${CARGO_TARGET_DIR:-target}/release clean start
     if [[ $host == *-linux-gnu ]]; then
         tools
         PATH=$tools/bin:$PATH cargo-zigbuild build --quiet --locked --release -p ohmstrain-c --target "$host.2.17"
@@ -199,12 +199,12 @@ library() {
     else
         cargo build --quiet --locked --release -p ohmstrain-c
     fi
-    folder=$(mktemp -d)
-    mkdir -p "$folder/$name/lib"
-    cp -r crates/c/include crates/c/examples crates/c/README.md LICENSE-MIT LICENSE-APACHE "$folder/$name"
-    cp crates/ohmstrain/examples/sensor.toml "$folder/$name/examples"
-    cp "$built"/libohmstrain_c.{a,so,dylib} "$folder/$name/lib" 2>/dev/null || true
-    tar -C "$folder" -czf "$out/$name.tar.gz" "$name"
+    packed=$(mktemp -d)
+    mkdir -p "$packed/$name/lib"
+    cp -r crates/c/include crates/c/examples crates/c/README.md LICENSE-MIT LICENSE-APACHE "$packed/$name"
+    cp crates/ohmstrain/examples/sensor.toml "$packed/$name/examples"
+    cp "$built"/libohmstrain_c.{a,so,dylib} "$packed/$name/lib" 2>/dev/null || true
+    tar -C "$packed" -czf "$out/$name.tar.gz" "$name"
     clean=$(mktemp -d)
     tar -C "$clean" -xzf "$out/$name.tar.gz"
     start=$SECONDS
@@ -216,8 +216,8 @@ library() {
         cc -std=c99 -O2 filter.c -I../include -L../lib -lohmstrain_c -lm -o shared
         [[ $(LD_LIBRARY_PATH=../lib ./shared sensor.toml readings.csv | wc -l) -eq 4 ]] || die "the shared library filtered nothing"
     )
-    made "$out/$name.tar.gz" "$(glibc "$(echo "$folder/$name/lib"/*.so)"), a C99 compiler" $((SECONDS - start))
-    rm -rf "$clean" "$folder"
+    made "$out/$name.tar.gz" "$(glibc "$(echo "$packed/$name/lib"/*.so)"), a C99 compiler" $((SECONDS - start))
+    rm -rf "$clean" "$packed"
 }
 
 # The library, and the example sensor's filter: an Arduino library, and C that any compiler takes.
