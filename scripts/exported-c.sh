@@ -101,10 +101,10 @@ near() {
 
 # promised FOLDER: what the header says of a Cortex-M4F, against what was counted in the last on_target.
 promised() {
-    local said counted
-    said=$(tr -d '\n' <"$1/src/ohmstrain.h" | sed 's/ \* / /g' | grep -oE 'about [0-9]+ instructions a step, [0-9]+ B of +code and constants, [0-9]+ B of state and [0-9]+' | grep -oE '[0-9]+')
+    local stated counted
+    stated=$(tr -d '\n' <"$1/src/ohmstrain.h" | sed 's/ \* / /g' | grep -oE 'about [0-9]+ instructions a step, [0-9]+ B of +code and constants, [0-9]+ B of state and [0-9]+' | grep -oE '[0-9]+')
     counted=$(grep -oE 'step: [0-9]+|state [0-9]+|stack [0-9]+' "$work/output" | grep -oE '[0-9]+')
-    set -- "${1##*/}" $said $counted
+    set -- "${1##*/}" $stated $counted
     near "$1" "instructions a step" "$6" "$2"
     near "$1" "bytes of code and constants" "$code" "$3"
     near "$1" "bytes of state" "$7" "$4"
@@ -341,10 +341,10 @@ fi
 paste -d'\n' docs/costs.md "$work/costs.md" | awk '
     function numbers(line, all) { gsub(/[^0-9. ]/, " ", line); gsub(/\. /, " ", line); return split(line, all, " ") }
     function words(line) { gsub(/[0-9]/, "", line); return line }
-    NR % 2 { said = $0; next }
+    NR % 2 { stated = $0; next }
     {
-        n = numbers(said, a); m = numbers($0, b)
-        if (n != m || words(said) != words($0)) { bad = 1 }
+        n = numbers(stated, a); m = numbers($0, b)
+        if (n != m || words(stated) != words($0)) { bad = 1 }
         for (k = 1; k <= n; k++) { if (b[k] + 0 > 1.1 * a[k] || b[k] + 0 < 0.9 * a[k]) { bad = 1 } }
-        if (bad) { print "docs/costs.md says " said ", found " $0 ": run with --update"; exit 1 }
+        if (bad) { print "docs/costs.md says " stated ", found " $0 ": run with --update"; exit 1 }
     }' >&2

@@ -97,7 +97,7 @@ def main(program, folder, every="60"):
     for name, group in GROUPS.items():
         for way in ("filter", "smoother"):
             there = [case for case in group if (case, way, "") in cases.scores]
-            cells = [cell([cases.scores[case, way, told] for case in there]) for told in known] if there else []
+            cells = [cell([cases.scores[case, way, known_name] for case in there]) for known_name in known] if there else []
             print(f"| {name} | {way} | {' | '.join(cells)} |", flush=True)
 
 

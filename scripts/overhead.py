@@ -82,8 +82,8 @@ def main():
     os.environ.update(OHMSTRAIN=str(program), PYTHONWARNINGS="ignore", RAYON_NUM_THREADS="1")
 
     def seconds(*words):
-        said = subprocess.run([str(word) for word in words], capture_output=True, text=True, check=True).stdout
-        return float(said.split()[0])
+        printed = subprocess.run([str(word) for word in words], capture_output=True, text=True, check=True).stdout
+        return float(printed.split()[0])
 
     for estimator, size in cases:
         fleet = folder / f"fleet-{size}"

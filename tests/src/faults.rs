@@ -22,7 +22,7 @@ const TWO_SIDED: f64 = 1.959_963_984_540_054;
 
 /// Output of a filter for a row.
 #[derive(Clone, Copy, Debug)]
-pub struct Said {
+pub struct FilterOutput {
     time_s: f64,
     strain: f64,
     strain_sd: f64,
@@ -41,7 +41,7 @@ pub struct Score {
 }
 
 impl Score {
-    fn add(&mut self, row: &Said, truth: f64, full_scale: f64) {
+    fn add(&mut self, row: &FilterOutput, truth: f64, full_scale: f64) {
         let error = row.strain - truth;
         let covered = error.abs() <= TWO_SIDED * row.strain_sd;
         self.rows += 1.0;
@@ -133,17 +133,18 @@ impl Answer {
 
 /// Returns the library's estimates row by row, with the true strain; rows that the filter rejects are left out.
 #[must_use]
-pub fn estimates(builder: FilterBuilder, trace: &Trace) -> Vec<(Said, f64)> {
+pub fn estimates(builder: FilterBuilder, trace: &Trace) -> Vec<(FilterOutput, f64)> {
     let Ok(mut filter) = builder.build() else { return Vec::new() };
     let strain = trace.reference.as_ref().map(|reference| &reference.values);
     let truth = |row: usize| strain.map_or(f64::NAN, |strain| strain[row]);
-    let said = |row: Estimate| Said {
+    let output = |row: Estimate| FilterOutput {
         time_s: row.time_s,
         strain: row.strain,
         strain_sd: row.strain_sd,
         flagged: is_flagged(&row),
     };
-    let step = |row: usize| Some((said(filter.step(trace.time_s[row], trace.readings.values[row]).ok()?), truth(row)));
+    let step =
+        |row: usize| Some((output(filter.step(trace.time_s[row], trace.readings.values[row]).ok()?), truth(row)));
     (0..trace.len()).filter_map(step).collect()
 }
 
@@ -155,7 +156,7 @@ const LONG_RUN: u32 = 256;
 ///
 /// # Errors
 /// If it cannot be run, or its output has another form.
-pub fn replayed(program: &Path, trace: &Trace) -> std::io::Result<Vec<(Said, f64)>> {
+pub fn replayed(program: &Path, trace: &Trace) -> std::io::Result<Vec<(FilterOutput, f64)>> {
     let strain = trace.reference.as_ref().map(|reference| &reference.values);
     let (mut recording, mut truths, mut last_s) = ("time_s,resistance_ohm\n".to_owned(), Vec::new(), f64::NEG_INFINITY);
     for (row, &time_s) in trace.time_s.iter().enumerate().filter(|(_, time_s)| !time_s.is_nan()) {
@@ -172,12 +173,12 @@ pub fn replayed(program: &Path, trace: &Trace) -> std::io::Result<Vec<(Said, f64
     stdin.write_all(recording.as_bytes())?;
     stdin.rewind()?;
     let printed = Command::new(program).stdin(stdin).stderr(Stdio::inherit()).output()?.stdout;
-    let said = |line: &str| {
+    let output = |line: &str| {
         let numbers: Option<Vec<f64>> = line.split(',').map(|cell| cell.parse().ok()).collect();
         let [time_s, strain, strain_sd, flags] = numbers?[..] else { return None };
-        Some(Said { time_s, strain, strain_sd, flagged: flags as u32 & !LONG_RUN != 0 })
+        Some(FilterOutput { time_s, strain, strain_sd, flagged: flags as u32 & !LONG_RUN != 0 })
     };
-    let rows: Option<Vec<Said>> = String::from_utf8_lossy(&printed).lines().skip(1).map(said).collect();
+    let rows: Option<Vec<FilterOutput>> = String::from_utf8_lossy(&printed).lines().skip(1).map(output).collect();
     match rows.filter(|rows| rows.len() == truths.len()) {
         Some(rows) => Ok(rows.into_iter().zip(truths).collect()),
         None => Err(std::io::Error::other(format!("{}: printed other rows", program.display()))),
@@ -186,7 +187,7 @@ pub fn replayed(program: &Path, trace: &Trace) -> std::io::Result<Vec<(Said, f64
 
 /// Injects a fault into a recording at several times, and accumulates the filter's response.
 pub fn answer(
-    run: &dyn Fn(&Trace) -> Vec<(Said, f64)>,
+    run: &dyn Fn(&Trace) -> Vec<(FilterOutput, f64)>,
     trace: &Trace,
     (episode, onsets_s): (Episode, &[f64]),
     full_scale: f64,
@@ -225,8 +226,8 @@ pub fn answer(
 
 /// Returns the time after a fault's end at which the mean error was last too large, s. Rows are compared from the end backwards,
 /// where both runs have the same ones.
-fn recovery_s(faulty: &[(Said, f64)], clean: &[(Said, f64)], end_s: f64, full_scale: f64) -> f64 {
-    let error = |(row, truth): &(Said, f64)| (row.strain - truth).abs();
+fn recovery_s(faulty: &[(FilterOutput, f64)], clean: &[(FilterOutput, f64)], end_s: f64, full_scale: f64) -> f64 {
+    let error = |(row, truth): &(FilterOutput, f64)| (row.strain - truth).abs();
     let pairs = faulty.iter().rev().zip(clean.iter().rev());
     let worse: Vec<(f64, f64)> = pairs
         .take_while(|(row, _)| row.0.time_s >= end_s)

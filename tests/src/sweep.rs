@@ -5,7 +5,7 @@ use ohmstrain_bench_data::Trace;
 use ohmstrain_bench_data::faults::{Episode, Fault};
 use ohmstrain_bench_data::simulate::{Material, Protocol, SettingsError, SimulationSettings, simulate};
 
-use crate::faults::{AFTER_S, Answer, BEFORE_S, Said, answer, estimates};
+use crate::faults::{AFTER_S, Answer, BEFORE_S, FilterOutput, answer, estimates};
 
 /// A sensor calibrated on the first half of the demo's recording: `ohmstrain demo --seed 1`, version 0.1.0.
 pub const SENSOR: &str = include_str!("../fixtures/representative.toml");
@@ -85,7 +85,7 @@ pub fn recordings() -> Result<[Trace; 2], SettingsError> {
 }
 
 /// A filter: estimates of a recording, row by row, with the true strain.
-pub type Run<'a> = Box<dyn Fn(&Trace) -> Vec<(Said, f64)> + 'a>;
+pub type Run<'a> = Box<dyn Fn(&Trace) -> Vec<(FilterOutput, f64)> + 'a>;
 
 /// Returns a run of the library with an estimator of the sensor.
 #[must_use]
@@ -114,19 +114,19 @@ pub fn answer_to(run: &Run, case: &Case, traces: &[Trace]) -> Answer {
 /// Returns a row of the table, in Markdown.
 #[must_use]
 pub fn row(name: &str, run: &Run, case: &Case, traces: &[Trace]) -> String {
-    let said = answer_to(run, case, traces);
+    let response = answer_to(run, case, traces);
     let cell = |score: &crate::faults::Score| format!("{:.1} ({:.0})", score.rmse(), score.coverage());
     format!(
         "| {} | {} | {} | {} | {} | {} | {:.0} | {:.0} | {:.0} | {:.0} |",
         case.name,
         name,
-        cell(&said.before),
-        cell(&said.during),
-        cell(&said.soon),
-        cell(&said.later),
-        said.during.flagged(),
-        said.during.silent(),
-        said.recovered(),
-        said.slowest_s()
+        cell(&response.before),
+        cell(&response.during),
+        cell(&response.soon),
+        cell(&response.later),
+        response.during.flagged(),
+        response.during.silent(),
+        response.recovered(),
+        response.slowest_s()
     )
 }

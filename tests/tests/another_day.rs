@@ -27,12 +27,12 @@ fn errors(sensor: &Sensor, factor: f64, with: impl Fn(FilterBuilder) -> FilterBu
 fn another_day_is_found_where_the_sensor_moves_as_in_calibration() {
     let sensor = Sensor::from_toml(SENSOR).unwrap();
     let rested = sensor.params().rested();
-    let [same_day, told, held] = [(1.0, 1.0), (1.5, 1.5), (1.5, 1.0)]
-        .map(|(factor, said)| errors(&sensor, factor, |filter| filter.rest_resistance(said * rested)));
+    let [same_day, given, held] = [(1.0, 1.0), (1.5, 1.5), (1.5, 1.0)]
+        .map(|(factor, rest_factor)| errors(&sensor, factor, |filter| filter.rest_resistance(rest_factor * rested)));
     let followed = errors(&sensor, 1.5, |filter| filter);
-    println!("same day {same_day:.2?}, told {told:.2?}, held {held:.2?}, followed {followed:.2?}");
-    for (same_day, told) in same_day.into_iter().zip(told) {
-        assert!((told - same_day).abs() < 1e-3 * same_day);
+    println!("same day {same_day:.2?}, told {given:.2?}, held {held:.2?}, followed {followed:.2?}");
+    for (same_day, given) in same_day.into_iter().zip(given) {
+        assert!((given - same_day).abs() < 1e-3 * same_day);
     }
     for (held, followed) in held.into_iter().zip(followed) {
         assert!(followed < 0.7 * held);

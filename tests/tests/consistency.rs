@@ -15,7 +15,7 @@ const DT_S: f64 = 0.2;
 
 /// A sensor known to stretch, with the noise that the filter assumes.
 #[derive(Clone, Copy)]
-struct Told {
+struct AssumedNoise {
     sensor: KnownPhase<SwitchedModel<f64, 1, 3>>,
     /// Factor on the filter's Q.
     process: f64,
@@ -23,7 +23,7 @@ struct Told {
     reading: f64,
 }
 
-impl Dynamics<f64, 3, 6> for Told {
+impl Dynamics<f64, 3, 6> for AssumedNoise {
     type Prepared = <SwitchedModel<f64, 1, 3> as Dynamics<f64, 3, 6>>::Prepared;
 
     fn prepare(&self, dt_s: f64) -> Self::Prepared {
@@ -41,15 +41,15 @@ impl Dynamics<f64, 3, 6> for Told {
     }
 }
 
-impl Channel<f64, 3, 6> for Told {
+impl Channel<f64, 3, 6> for AssumedNoise {
     fn observe(&self, at: &Belief<f64, 3, 6>, phase: Option<Phase>) -> Observation<f64, 3> {
         let right = self.sensor.observe(at, phase);
         Observation { variance: right.variance * self.reading, ..right }
     }
 }
 
-fn told(process: f64, reading: f64) -> Told {
-    Told { sensor: KnownPhase { model: switching_sensor(), phase: Phase::Extend }, process, reading }
+fn with_noise(process: f64, reading: f64) -> AssumedNoise {
+    AssumedNoise { sensor: KnownPhase { model: switching_sensor(), phase: Phase::Extend }, process, reading }
 }
 
 /// Sums of independent χ² terms.
@@ -70,8 +70,8 @@ fn nees(truth: &SVector<f64, 3>, belief: &Belief<f64, 3, 6>) -> f64 {
 }
 
 /// Returns the statistics of a filter with the factors `assumed` on data from the unchanged sensor.
-fn statistics(assumed: Told) -> Statistics {
-    let truth = told(1.0, 1.0);
+fn statistics(assumed: AssumedNoise) -> Statistics {
+    let truth = with_noise(1.0, 1.0);
     let spread = [1e-3, 1e-3, 1e-3];
     let start: Belief<f64, 3, 6> = Belief::independent(SVector::from([0.1, 0.1, 0.0]), &spread);
     let prepared = truth.prepare(DT_S);
@@ -118,7 +118,7 @@ fn places(sums: &Statistics) -> [std::cmp::Ordering; 3] {
 
 #[test]
 fn a_matched_filter_and_smoother_are_consistent() {
-    let sums = statistics(told(1.0, 1.0));
+    let sums = statistics(with_noise(1.0, 1.0));
     assert_eq!(places(&sums), [std::cmp::Ordering::Equal; 3], "{sums:?}");
 }
 
@@ -126,7 +126,7 @@ fn a_matched_filter_and_smoother_are_consistent() {
 #[test]
 fn a_wrong_filter_is_found_out() {
     for (factor, side) in [(4.0, std::cmp::Ordering::Less), (0.25, std::cmp::Ordering::Greater)] {
-        for (what, assumed) in [("Q", told(factor, 1.0)), ("R", told(1.0, factor))] {
+        for (what, assumed) in [("Q", with_noise(factor, 1.0)), ("R", with_noise(1.0, factor))] {
             let sums = statistics(assumed);
             println!("{what} × {factor}: {sums:?}");
             assert_eq!(places(&sums), [side; 3], "{what} × {factor}: {sums:?}");

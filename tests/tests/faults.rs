@@ -32,9 +32,9 @@ fn a_fault_that_ends_is_over() {
     let spikes = "spikes × 1.3, 5 % of the rows, 20 s";
     let names = ["one spike, × 1.3", spikes, "unplugged, 210 kΩ, 2 s", "stuck, 20 s"];
     for name in names {
-        let said = answer_to(&default, case(name), &traces[..1]);
-        assert!(said.soon.coverage() >= 95.0 && said.later.coverage() >= 95.0, "{name}: {said:?}");
-        assert!(said.soon.rmse() < 1.5 * said.before.rmse(), "{name}: {said:?}");
+        let response = answer_to(&default, case(name), &traces[..1]);
+        assert!(response.soon.coverage() >= 95.0 && response.later.coverage() >= 95.0, "{name}: {response:?}");
+        assert!(response.soon.rmse() < 1.5 * response.before.rmse(), "{name}: {response:?}");
     }
     let recovered = names.map(|name| answer_to(&default, case(name), &traces).recovered());
     assert!(recovered.iter().sum::<f64>() >= 95.0 * names.len() as f64, "{recovered:?}");
@@ -42,22 +42,22 @@ fn a_fault_that_ends_is_over() {
 
 /// Without a second look, the filter recovers within five seconds in at most 75 % of these cases.
 #[test]
-fn a_filter_that_was_led_astray_looks_again() {
+fn a_filter_that_was_led_astray_recovers_by_a_second_look() {
     let (sensor, traces) = (Sensor::from_toml(SENSOR).unwrap(), recordings().unwrap());
     let default = of_library(&sensor, EstimatorKind::Corrected);
     for name in ["step in baseline, 50 % of R₀, 10 s", "gain × 1.5, 20 s", "R₀ × 1.2, 20 s"] {
-        let said = answer_to(&default, case(name), &traces);
-        assert!(said.recovered() >= 90.0, "{name}: {said:?}");
+        let response = answer_to(&default, case(name), &traces);
+        assert!(response.recovered() >= 90.0, "{name}: {response:?}");
     }
 }
 
 /// The filter flags nearly all of its wrong rows. Without doubts 85 and 69 % of the rows are wrong without a flag.
 #[test]
-fn what_cannot_be_helped_is_said() {
+fn unavoidable_errors_are_flagged() {
     let (sensor, traces) = (Sensor::from_toml(SENSOR).unwrap(), recordings().unwrap());
     let default = of_library(&sensor, EstimatorKind::Corrected);
     for name in ["step in baseline, 50 % of R₀, 10 s", "R₀ × 1.2, 20 s"] {
-        let said = answer_to(&default, case(name), &traces[..1]);
-        assert!(said.during.silent() < 10.0, "{name}: {said:?}");
+        let response = answer_to(&default, case(name), &traces[..1]);
+        assert!(response.during.silent() < 10.0, "{name}: {response:?}");
     }
 }

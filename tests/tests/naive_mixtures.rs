@@ -10,7 +10,7 @@ use ohmstrain_ekf::{
 use ohmstrain_model::{Phase, StrainRange, SwitchedModel};
 use ohmstrain_tests::sensor;
 
-use naive::{Naive, Rule, Said};
+use naive::{Comparison, Naive, Rule};
 
 const DT_S: f64 = 0.01;
 const STEPS: usize = 3000;
@@ -44,7 +44,7 @@ fn model<const B: usize, const N: usize>(phase_rate: f64) -> SwitchedModel<f64, 
 struct Apart {
     belief: f64,
     weight: f64,
-    said: f64,
+    innovation: f64,
     hypotheses: usize,
 }
 
@@ -70,13 +70,13 @@ impl Apart {
         }
     }
 
-    fn add_said(&mut self, said: Option<Said>, innovation: Option<Innovation<f64>>) {
-        assert_eq!(said.is_some(), innovation.is_some());
-        if let (Some(said), Some(innovation)) = (said, innovation) {
-            let ((value, variance), log_density) = (said.innovation, said.log_density);
-            larger(&mut self.said, (value - innovation.value).abs() / variance.sqrt());
-            larger(&mut self.said, (innovation.variance / variance - 1.0).abs());
-            larger(&mut self.said, (innovation.log_likelihood - log_density).abs());
+    fn add_comparison(&mut self, comparison: Option<Comparison>, innovation: Option<Innovation<f64>>) {
+        assert_eq!(comparison.is_some(), innovation.is_some());
+        if let (Some(comparison), Some(innovation)) = (comparison, innovation) {
+            let ((value, variance), log_density) = (comparison.innovation, comparison.log_density);
+            larger(&mut self.innovation, (value - innovation.value).abs() / variance.sqrt());
+            larger(&mut self.innovation, (innovation.variance / variance - 1.0).abs());
+            larger(&mut self.innovation, (innovation.log_likelihood - log_density).abs());
         }
     }
 
@@ -88,7 +88,7 @@ impl Apart {
     fn check(&self) {
         let rounding = STEPS as f64 * 3000.0 * f64::EPSILON;
         let weighed = 24_f64.sqrt() * rounding;
-        assert!(self.belief < rounding + weighed && self.weight < weighed && self.said < weighed, "{self:?}");
+        assert!(self.belief < rounding + weighed && self.weight < weighed && self.innovation < weighed, "{self:?}");
     }
 }
 
@@ -109,9 +109,9 @@ where
     for k in 0..STEPS {
         let before = state.moments();
         let taken = filter.advance(&state, &prepared, reading(k)).unwrap();
-        let (next, said) = naive.step::<L>(&own, DT_S, reading(k));
+        let (next, comparison) = naive.step::<L>(&own, DT_S, reading(k));
         (state, own) = (taken.state, next);
-        most.add_said(said, taken.innovation);
+        most.add_comparison(comparison, taken.innovation);
         most.add(own.moments(), &state.moments(), &before);
         let shares: Vec<_> = shares(&state).into_iter().filter(|share| share.0 > 0.0).collect();
         assert_eq!(shares.len(), own.all.len(), "row {k}");
@@ -224,8 +224,8 @@ where
     for k in (0..PAST).rev() {
         let followed: Vec<bool> = shares(&states[k]).iter().map(|share| share.0 > 0.0).collect();
         let later: Vec<bool> = shares(&states[k + 1]).iter().map(|share| share.0 > 0.0).collect();
-        let heirs: Vec<_> = of(&next).into_iter().zip(&later).filter_map(|(one, on)| on.then_some(one)).collect();
-        let expected = naive.back::<L>(&own[k], (&own[k + 1], &heirs), SLOW_DT_S);
+        let smoothed: Vec<_> = of(&next).into_iter().zip(&later).filter_map(|(one, on)| on.then_some(one)).collect();
+        let expected = naive.back::<L>(&own[k], (&own[k + 1], &smoothed), SLOW_DT_S);
         next = filter.smooth_back(&states[k], &prepared, reading(10 * k), &next).unwrap().unwrap();
         let found: Vec<_> = of(&next).into_iter().zip(&followed).filter_map(|(one, on)| on.then_some(one)).collect();
         assert_eq!(found.len(), expected.len(), "row {k}");

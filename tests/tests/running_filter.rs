@@ -207,14 +207,14 @@ fn rows_without_a_reading_leave_no_trace() {
             let first = (start != Start::Unknown).then_some(0);
             let mut filters = [0; 2].map(|_| build_filter(&params, Some(kind), start).unwrap());
             let [empty, cut] = &mut filters;
-            let mut said = Vec::new();
+            let mut expected = Vec::new();
             for k in 0..600 {
                 empty.step(time_s[k], readings[k]).unwrap();
-                said.push(shown(&**empty));
+                expected.push(shown(&**empty));
             }
             for k in first.into_iter().chain(rows()) {
                 cut.step(time_s[k], readings[k]).unwrap();
-                assert_eq!(shown(&**cut), said[k], "{} row {k}", kind.name());
+                assert_eq!(shown(&**cut), expected[k], "{} row {k}", kind.name());
             }
         }
         let smoothed = |rows: &[usize]| {

@@ -34,7 +34,7 @@ export class Engine {
   private calls = 0;
 
   private constructor(private readonly worker: Worker) {
-    worker.onmessage = (event) => this.hear(event.data);
+    worker.onmessage = (event) => this.receive(event.data);
     worker.onerror = (event) => this.fail(new Error(event.message || "the worker stopped"));
   }
 
@@ -65,15 +65,15 @@ export class Engine {
     this.waiting.clear();
   }
 
-  private hear(told: { call: number; result?: never; error?: string; isPanic?: boolean; stage?: string; share?: number }) {
-    if (told.stage !== undefined) {
-      this.onProgress(told.stage, told.share ?? 0);
+  private receive(message: { call: number; result?: never; error?: string; isPanic?: boolean; stage?: string; share?: number }) {
+    if (message.stage !== undefined) {
+      this.onProgress(message.stage, message.share ?? 0);
       return;
     }
-    const waiting = this.waiting.get(told.call);
-    this.waiting.delete(told.call);
-    if (told.isPanic) this.isBroken = true;
-    if (told.error === undefined) waiting?.resolve(told.result as never);
-    else waiting?.reject(new Error(told.error));
+    const waiting = this.waiting.get(message.call);
+    this.waiting.delete(message.call);
+    if (message.isPanic) this.isBroken = true;
+    if (message.error === undefined) waiting?.resolve(message.result as never);
+    else waiting?.reject(new Error(message.error));
   }
 }

@@ -1,6 +1,6 @@
 /** Step 4: a board on a USB cable, or a recording that is played; strain with its interval, and a record of the readings. */
 
-import type { StreamSaid } from "../pkg/ohmstrain.js";
+import type { StreamSummary } from "../pkg/ohmstrain.js";
 import { STREAM_ROLES, guess, header } from "./columns";
 import { byId, choice, field, h } from "./dom";
 import { LiveView } from "./live_view";
@@ -143,10 +143,10 @@ class Session implements Listener {
       while (this.waiting !== "") {
         const text = this.waiting;
         this.waiting = "";
-        const { rows, said, recorded } = await this.current.engine.call("streamTake", text, arrivedSeconds);
-        this.view.take(rows, said, this.raw);
-        if (said.columns.length > 0) this.isHeaded = true;
-        if (!this.isHeaded && said.counts.badLines >= LINES_WITHOUT) this.askColumns();
+        const { rows, summary, recorded } = await this.current.engine.call("streamTake", text, arrivedSeconds);
+        this.view.take(rows, summary, this.raw);
+        if (summary.columns.length > 0) this.isHeaded = true;
+        if (!this.isHeaded && summary.counts.badLines >= LINES_WITHOUT) this.askColumns();
         if (this.record && recorded !== "") this.keep(this.record, recorded);
         if (this.view.isCalm) await new Promise((wake) => setTimeout(wake, CALM_MS));
       }
@@ -179,8 +179,8 @@ class Session implements Listener {
 
   private async tell(method: "streamRest" | "streamZero"): Promise<void> {
     try {
-      const said = await this.current.engine.call(method);
-      this.view.said(said);
+      const summary = await this.current.engine.call(method);
+      this.view.showSummary(summary);
     } catch (error) {
       this.view.fail(error instanceof Error ? error.message : String(error));
     }
@@ -194,10 +194,10 @@ class Session implements Listener {
       await showRecords();
       return;
     }
-    const said: StreamSaid = await this.current.engine.call("streamSaid");
-    if (said.columns.length === 0) return;
+    const summary: StreamSummary = await this.current.engine.call("streamSummary");
+    if (summary.columns.length === 0) return;
     const name = `live-${new Date().toISOString().slice(0, 19).replaceAll(":", "-")}.csv`;
-    this.keep(name, `${said.metadata}${said.columns.join(",")}\n`);
+    this.keep(name, `${summary.metadata}${summary.columns.join(",")}\n`);
     this.record = name;
     this.view.recording(name);
   }

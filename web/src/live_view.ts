@@ -1,6 +1,6 @@
 /** What is shown while readings come: the strain and its interval, the stream, counts, and what a person can tell. */
 
-import type { SensorDescription, StreamSaid } from "../pkg/ohmstrain.js";
+import type { SensorDescription, StreamSummary } from "../pkg/ohmstrain.js";
 import { h } from "./dom";
 import { Plot } from "./plots";
 
@@ -85,9 +85,9 @@ export class LiveView {
     this.message.textContent = text;
   }
 
-  said(said: StreamSaid): void {
+  showSummary(summary: StreamSummary): void {
     this.message.className = "hint";
-    this.message.textContent = said.message;
+    this.message.textContent = summary.message;
   }
 
   recording(name: string | undefined): void {
@@ -101,7 +101,7 @@ export class LiveView {
   }
 
   /** Takes rows, what there is to say, and the last lines. */
-  take(rows: Float64Array, said: StreamSaid, raw: string[]): void {
+  take(rows: Float64Array, summary: StreamSummary, raw: string[]): void {
     const [times] = this.columns;
     for (let k = 0; k + WIDTH <= rows.length; k += WIDTH) {
       if ((rows[k] ?? 0) <= (times?.at(-1) ?? Number.NEGATIVE_INFINITY)) this.forget(times?.length ?? 0);
@@ -111,19 +111,19 @@ export class LiveView {
     const old = times?.findIndex((time) => time >= oldest) ?? 0;
     // Not row by row: what is before the window is cut off now and then.
     if (old > (times?.length ?? 0) / 4) this.forget(old);
-    if (performance.now() - this.wordsAt > WORDS_MS) this.words(said, raw);
-    else this.later(said, raw);
+    if (performance.now() - this.wordsAt > WORDS_MS) this.words(summary, raw);
+    else this.later(summary, raw);
     if (!this.isDue) requestAnimationFrame(() => this.draw());
     this.isDue = true;
   }
 
-  private words(said: StreamSaid, raw: string[]): void {
+  private words(summary: StreamSummary, raw: string[]): void {
     clearTimeout(this.pending);
     this.pending = undefined;
     this.wordsAt = performance.now();
-    if (said.message !== this.message.textContent) this.said(said);
-    const { rows, missing, badLines, restarts } = said.counts;
-    const columns = said.columns.join(", ") || "no columns yet";
+    if (summary.message !== this.message.textContent) this.showSummary(summary);
+    const { rows, missing, badLines, restarts } = summary.counts;
+    const columns = summary.columns.join(", ") || "no columns yet";
     this.counts.textContent = `${columns}: ${rows} rows, ${missing} missing, ${badLines} lines skipped, ${restarts} restarts`;
     this.stream.textContent = raw.join("\n");
     const [strain, half] = [this.columns[2]?.at(-1), 1.96 * (this.columns[3]?.at(-1) ?? 0)];
@@ -133,9 +133,9 @@ export class LiveView {
   }
 
   /** The last words of a stream that pauses are shown, too. */
-  private later(said: StreamSaid, raw: string[]): void {
+  private later(summary: StreamSummary, raw: string[]): void {
     clearTimeout(this.pending);
-    this.pending = setTimeout(() => this.words(said, raw), WORDS_MS);
+    this.pending = setTimeout(() => this.words(summary, raw), WORDS_MS);
   }
 
   /** Asks for the columns of a stream; `answered` returns what is wrong with the answer. */

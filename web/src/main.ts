@@ -28,8 +28,8 @@ function group(files: Dropped[], channel = ""): Group {
 async function divide(whole: Group, answers: string[]): Promise<void> {
   const channels = answers.map((answer) => {
     const one = group(whole.files, channelOf(answer));
-    one.said = whole.said.copy();
-    one.said.answer(answer);
+    one.answers = whole.answers.copy();
+    one.answers.answer(answer);
     return one;
   });
   state.groups.splice(state.groups.indexOf(whole), 1, ...channels);
@@ -40,7 +40,7 @@ async function divide(whole: Group, answers: string[]): Promise<void> {
 }
 
 function say(text: string): void {
-  byId("said").textContent = text;
+  byId("status").textContent = text;
 }
 
 /** Takes files: sensors apart from recordings, and several recordings apart from files of one. */

@@ -5,7 +5,7 @@ import { byId, choice, field, h, save, sentences } from "./dom";
 import type { Engine } from "./engine";
 import { Plot } from "./plots";
 import type { RecordingData } from "./protocol";
-import { Said } from "./said";
+import { Answers } from "./answers";
 
 /** A file as it was dropped. */
 export interface Dropped {
@@ -15,7 +15,7 @@ export interface Dropped {
 
 /** Files of one recording, what is said of them, and what was understood. */
 export class Group {
-  said = new Said();
+  answers = new Answers();
   described: Described | undefined;
   recording: RecordingData | undefined;
   /** Why nothing can be understood. */
@@ -46,7 +46,7 @@ export class Group {
     this.survey.replaceChildren();
     try {
       const engine = await this.engine();
-      const found = await engine.call("inspect", this.id, this.files, this.said.flags());
+      const found = await engine.call("inspect", this.id, this.files, this.answers.flags());
       this.described = found.described;
       this.recording = found.recording;
       this.show();
@@ -96,7 +96,7 @@ export class Group {
     const options = question.answers.map((answer): [string, string] => [answer, answer]);
     const answers = choice("Answer", [["", "choose"], ...options], "", (answer) => {
       if (isLength(answer)) this.element.querySelector<HTMLInputElement>("[name=length]")?.focus();
-      else this.say(() => this.said.answer(answer));
+      else this.say(() => this.answers.answer(answer));
     });
     answers.querySelector("select")?.setAttribute("name", "answer");
     const isChannel = (answer: string) => channelOf(answer) !== "";
@@ -142,12 +142,12 @@ export class Group {
     const [role, unit] = column.taken ?? ["", ""];
     const unsure = !column.taken && column.candidate ? `(${column.candidate}?)` : "–";
     const roles = described.roles.map((one): [string, string] => [one.name, one.name]);
-    const takeFor = (wanted: string) => this.say(() => this.said.column(number, role, wanted));
+    const takeFor = (wanted: string) => this.say(() => this.answers.column(number, role, wanted));
     const roleChoice = choice(`${name} is taken for`, [["", unsure], ...roles], role, takeFor, true);
     roleChoice.querySelector("select")?.setAttribute("name", `role ${number}`);
     const units = described.roles.find((one) => one.name === role)?.units ?? [];
     const options = (units.includes(unit) ? units : [unit, ...units]).map((one): [string, string] => [one, one]);
-    const unitChoice = choice(`unit of ${name}`, options, unit, (it) => this.say(() => this.said.unit(role, it)), true);
+    const unitChoice = choice(`unit of ${name}`, options, unit, (it) => this.say(() => this.answers.unit(role, it)), true);
     unitChoice.querySelector("select")?.setAttribute("name", `unit ${number}`);
     return h(
       "tr",
@@ -162,14 +162,14 @@ export class Group {
   }
 
   private more(described: Described | undefined): HTMLElement {
-    const { said } = this;
-    const length = field("Length of the unstretched sensor, mm", said.gaugeLength, (it) =>
-      this.say(() => (said.gaugeLength = it)), { inputmode: "decimal", name: "length" });
-    const rate = field("Rows a second, if no column is a time", said.rate, (it) => this.say(() => (said.rate = it)), {
+    const { answers } = this;
+    const length = field("Length of the unstretched sensor, mm", answers.gaugeLength, (it) =>
+      this.say(() => (answers.gaugeLength = it)), { inputmode: "decimal", name: "length" });
+    const rate = field("Rows a second, if no column is a time", answers.rate, (it) => this.say(() => (answers.rate = it)), {
       inputmode: "decimal",
       name: "rate",
     });
-    const others = field("Other flags of `ohmstrain import`", said.others, (it) => this.say(() => (said.others = it)), {
+    const others = field("Other flags of `ohmstrain import`", answers.others, (it) => this.say(() => (answers.others = it)), {
       name: "flags",
       spellcheck: "false",
     });

@@ -91,10 +91,10 @@ class PortSource implements Source {
     if (this.isStopped) return;
     await this.port.close().catch(() => undefined);
     this.listener.away(why);
-    navigator.serial.addEventListener("connect", () => void this.again(), { once: true });
+    navigator.serial.addEventListener("connect", () => void this.reopen(), { once: true });
   }
 
-  private async again(): Promise<void> {
+  private async reopen(): Promise<void> {
     if (!this.isStopped) await this.open().catch((error: Error) => this.listener.away(error.message));
   }
 }

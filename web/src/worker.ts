@@ -72,10 +72,10 @@ function closing(made: Calibrated) {
 }
 
 const methods = {
-  inspect(id: string, files: { name: string; bytes: Uint8Array }[], said: string) {
+  inspect(id: string, files: { name: string; bytes: Uint8Array }[], answers: string) {
     const all = new Files();
     for (const { name, bytes } of files) all.add(name, bytes);
-    const inspection = all.inspect(said);
+    const inspection = all.inspect(answers);
     all.free();
     inspections.get(id)?.free();
     inspections.set(id, inspection);
@@ -143,18 +143,18 @@ const methods = {
   },
   streamTake(text: string, arrivedSeconds: number) {
     const rows = streamInUse().take(text, arrivedSeconds);
-    return { rows, said: streamInUse().said(), recorded: streamInUse().recorded() };
+    return { rows, summary: streamInUse().summary(), recorded: streamInUse().recorded() };
   },
-  streamSaid() {
-    return streamInUse().said();
+  streamSummary() {
+    return streamInUse().summary();
   },
   streamRest() {
     streamInUse().rest();
-    return streamInUse().said();
+    return streamInUse().summary();
   },
   streamZero() {
     streamInUse().zero();
-    return streamInUse().said();
+    return streamInUse().summary();
   },
 };
 
@@ -164,8 +164,8 @@ export type Methods = typeof methods;
 let current = 0;
 
 function progress(stage: string, share: number): void {
-  const told: Progress = { call: current, stage, share };
-  postMessage(told);
+  const message: Progress = { call: current, stage, share };
+  postMessage(message);
 }
 
 function run(call: number, method: keyof Methods, args: never[]): void {

@@ -90,7 +90,7 @@ test("what a board sends is filtered as the command line filters it, recorded, a
   folder.run("filter", "record.csv", "--sensor", "sensor.toml", "-o", "again.csv");
 });
 
-test("a board comes back, starts again, is at rest, and is zeroed", async () => {
+test("a board comes back, restarts, is at rest, and is zeroed", async () => {
   const page = await connected();
   const all = boardLines();
   await send(page, `time_s,resistance_ohm\n${all.slice(0, 50).join("\n")}\n`);

@@ -27,8 +27,8 @@ test("a calibration, filter and smoother are the command line's", () => {
   const stages = new Set<string>();
   let made: ReturnType<typeof calibrate> | undefined;
   const here = seconds(() => {
-    const told = (stage: string) => stages.add(stage);
-    made = calibrate([recording.copy()], { estimator, file: "sensor.toml" }, told);
+    const onStage = (stage: string) => stages.add(stage);
+    made = calibrate([recording.copy()], { estimator, file: "sensor.toml" }, onStage);
   });
   console.log(`calibrate: ${native.toFixed(1)} s native, ${here.toFixed(1)} s here: ${(here / native).toFixed(2)} times`);
   const sensor = made?.sensor() as Sensor;

@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn a_32_bit_counter_may_wrap_and_wrap_again() {
+    fn a_32_bit_counter_may_wrap_several_times() {
         let cells = ["4294967290", "4", "2000000000", "4000000000", "14"];
         let unwrapped: [u64; 5] = [4_294_967_290, 4_294_967_300, 6_294_967_296, 8_294_967_296, 2 * WRAP_US + 14];
         let expected: Vec<_> = unwrapped.iter().map(|us| Some(*us as f64 / 1e6)).collect();

@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_starts_again_after_three_lines_or_a_header() {
+    fn a_clock_restarts_after_three_lines_or_a_header() {
         let lines = ["time_s,resistance_ohm", "90,1600", "1,1600", "91,1600", "0,1", "1,1", "2,1", "3,1"];
         let known = [None, Some(90.0), None, Some(91.0), None, None, Some(2.0), Some(3.0)];
         assert_eq!(times(&lines), known);

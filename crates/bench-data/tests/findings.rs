@@ -71,7 +71,7 @@ fn a_hold_of_290_s_loses_about_a_tenth() {
 }
 
 #[test]
-fn resistance_rises_again_on_release_and_higher_at_higher_speed() {
+fn resistance_peaks_on_release_and_higher_at_higher_speed() {
     let [slow, fast] = [1.0, 5.0].map(|speed| MISMATCHED.long_hold(speed).release_peak());
     for (ratio, strain) in [slow, fast] {
         assert!((1.5..=1.75).contains(&ratio), "{ratio}");

@@ -114,7 +114,7 @@ fn like_movements_are_not_shifted_by_one() {
         if (0.0..1.0).contains(&phase) { 0.5 * height * (1.0 - (std::f64::consts::TAU * phase).cos()) } else { 0.0 }
     };
     let noise = |k: usize| (f64::from(u32::try_from(k * 7919 % 1000).unwrap()) / 1000.0 - 0.5) * 4.0;
-    let mut told = 0;
+    let mut found = 0;
     for (count, truth) in (2..=5).flat_map(|count| [0.0, -0.04, 0.3, -1.2, 20.0].map(|truth| (count, truth))) {
         for sign in [1.0, -1.0] {
             let lasts_s = 2.0 + 1.8 * f64::from(count);
@@ -126,9 +126,9 @@ fn like_movements_are_not_shifted_by_one() {
             let clock: Vec<f64> = times.iter().map(|t| t + truth).collect();
             if let Ok(lag) = ohmstrain_calib::clock_lag((&clock, &readings), (&times, &angles)) {
                 assert!((-lag.lag_s - truth).abs() < 3.0 * lag.sd_s + 0.05, "{count} bends: {lag:?} {truth}");
-                told += 1;
+                found += 1;
             }
         }
     }
-    assert!(told > 0);
+    assert!(found > 0);
 }

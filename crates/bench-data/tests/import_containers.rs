@@ -196,7 +196,7 @@ fn arrays_of_numpy() {
 }
 
 #[test]
-fn what_is_no_table_is_said_in_one_line() {
+fn a_file_without_a_table_is_refused_in_one_line() {
     for bytes in [
         b"PAR1 is all".to_vec(),
         b"PK\x03\x04".to_vec(),

@@ -65,10 +65,10 @@ pub fn tables(files: &[(&str, Vec<u8>)], recipe: &Recipe) -> Result<Vec<Table>, 
 pub fn proposed(files: &[(&str, Vec<u8>)], known: &Recipe) -> Result<(Recipe, Imported), ImportError> {
     let first = tables(files, known)?;
     let recipe = Plan::propose(&first, known)?.recipe(&first);
-    let again = tables(files, &recipe)?;
-    let plan = Plan::new(&again, &recipe)?;
-    assert_eq!(plan.recipe(&again), recipe, "a recipe leads to itself");
-    let imported = plan.import(&again)?;
+    let second = tables(files, &recipe)?;
+    let plan = Plan::new(&second, &recipe)?;
+    assert_eq!(plan.recipe(&second), recipe, "a recipe leads to itself");
+    let imported = plan.import(&second)?;
     let mut written = Vec::new();
     imported.trace.write(&mut written).unwrap();
     let read = Trace::read(written.as_slice(), "again").unwrap();

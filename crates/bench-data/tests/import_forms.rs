@@ -48,7 +48,7 @@ fn a_percent_sign_may_be_a_unit_and_a_hash_a_name() {
 }
 
 #[test]
-fn twins_are_told_apart_by_the_line_above_them_or_by_number() {
+fn twins_are_distinguished_by_the_line_above_them_or_by_number() {
     let row = |ms, ohm, strain| {
         let (ms, ohm, strain) = (decimal(ms, 3, '.'), decimal(ohm, 1, '.'), decimal(strain, 2, '.'));
         format!("{ms},{ohm},{ms},{strain}")
@@ -198,9 +198,9 @@ fn words_beside_numbers_above_the_names_are_no_data() {
 }
 
 #[test]
-fn what_stands_behind_the_data_is_passed_over_and_said() {
+fn lines_behind_the_data_are_skipped_with_a_remark() {
     let text = file("Time (s),R (Ohm),Strain (%)\n", seconds_ohms_percent);
-    for (behind, said) in [
+    for (behind, expected) in [
         ("End of data\n", "1 line among or behind the data passed over, which is line 62"),
         (
             "\nMax R,1700\nMean,1650.2,20.1\n",
@@ -210,7 +210,7 @@ fn what_stands_behind_the_data_is_passed_over_and_said() {
         ("3.3,16", "1 line among or behind the data passed over, which is line 62"),
     ] {
         let imported = is_imported("behind.csv", format!("{text}{behind}"), &Recipe::default());
-        assert!(imported.remarks.iter().any(|remark| remark.contains(said)), "{behind}: {:?}", imported.remarks);
+        assert!(imported.remarks.iter().any(|remark| remark.contains(expected)), "{behind}: {:?}", imported.remarks);
     }
 }
 
@@ -227,7 +227,7 @@ fn a_serial_line_begins_with_garbage() {
 }
 
 #[test]
-fn what_is_no_resistance_and_what_has_no_reference_is_said() {
+fn a_missing_resistance_or_reference_is_reported() {
     let nothing = Recipe::default();
     let volts = file("Time (s),Output (V),Strain (%)\n", seconds_ohms_percent);
     let known = |role: &str| Recipe {
@@ -243,8 +243,8 @@ fn what_is_no_resistance_and_what_has_no_reference_is_said() {
     asks(&[("a.csv", &sentinel)], &nothing, &["found -999", "--magnitude resistance", "--missing -999"]);
     let length = file("Time (s),R (Ohm),Length (mm)\n", seconds_ohms_percent);
     let (_, imported) = proposed(&[("a.csv", length.clone().into())], &nothing).unwrap();
-    let said = "--column 'displacement=Length (mm)'";
-    assert!(imported.remarks.iter().any(|remark| remark.contains(said)), "{:?}", imported.remarks);
-    let told = Recipe { columns: vec![("strain".parse().unwrap(), "none".parse().unwrap())], ..nothing };
-    assert!(proposed(&[("a.csv", length.into())], &told).unwrap().1.remarks.is_empty());
+    let expected = "--column 'displacement=Length (mm)'";
+    assert!(imported.remarks.iter().any(|remark| remark.contains(expected)), "{:?}", imported.remarks);
+    let answered = Recipe { columns: vec![("strain".parse().unwrap(), "none".parse().unwrap())], ..nothing };
+    assert!(proposed(&[("a.csv", length.into())], &answered).unwrap().1.remarks.is_empty());
 }

@@ -52,7 +52,7 @@ fn fewer_or_more_names_than_columns_are_those_of_the_first() {
 }
 
 #[test]
-fn blank_and_repeated_names_are_told_apart_by_number() {
+fn blank_and_repeated_names_are_distinguished_by_number() {
     let row = |ms, ohm, strain| {
         let (ms, ohm, strain) = (decimal(ms, 3, '.'), decimal(ohm, 1, '.'), decimal(strain, 2, '.'));
         format!("{ms},1,{ohm},{ohm},{strain}")
@@ -81,15 +81,15 @@ fn on_its_side(labels: [&str; 3], separator: &str) -> String {
 }
 
 #[test]
-fn a_table_on_its_side_is_read_and_said() {
+fn a_table_on_its_side_is_read_with_a_remark() {
     for (labels, separator) in [
         (["time_ms", "R (Ohm)", "strain_pct"], ","),
         (["Time\tms", "R\tOhm", "Strain\t%"], "\t"),
         (["Time (ms)", "R (Ohm)", "Strain (%)"], ";"),
     ] {
         let imported = is_imported("side.csv", on_its_side(labels, separator), &Recipe::default());
-        let said = "rows and columns seem to be exchanged";
-        assert!(imported.remarks.iter().any(|remark| remark.contains(said)), "{:?}", imported.remarks);
+        let expected = "rows and columns seem to be exchanged";
+        assert!(imported.remarks.iter().any(|remark| remark.contains(expected)), "{:?}", imported.remarks);
     }
     let bare = on_its_side(["1", "2", "3"], " ").replace("\n1 ", "\n").replace("\n2 ", "\n").replace("\n3 ", "\n");
     let bare = bare.strip_prefix("1 ").unwrap();

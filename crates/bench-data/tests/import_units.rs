@@ -60,8 +60,8 @@ fn a_reference_in_volts_is_asked_for_its_scale() {
         format!("{},{},{}", decimal(ms, 3, '.'), decimal(ohm, 1, '.'), decimal(strain, 2, '.'))
     });
     let (_, imported) = proposed(&[("a.csv", volts.clone().into())], &nothing).unwrap();
-    let said = "--column 'displacement=Position (V)' --unit displacement=4mm/V with its scale";
-    assert!(imported.remarks.iter().any(|remark| remark.contains(said)), "{:?}", imported.remarks);
+    let expected = "--column 'displacement=Position (V)' --unit displacement=4mm/V with its scale";
+    assert!(imported.remarks.iter().any(|remark| remark.contains(expected)), "{:?}", imported.remarks);
     let column = vec![("displacement".parse().unwrap(), "Position (V)".parse().unwrap())];
     let known = Recipe { columns: column.clone(), gauge_length_mm: Some(100.0), ..nothing };
     asks(&[("a.csv", &volts)], &known, &["the unit `V` is none of displacement", "--unit displacement=4mm/V"]);

@@ -135,9 +135,9 @@ proptest! {
         prop_assert!(back.is_ok(), "{:?}\n{}", back, String::from_utf8_lossy(&file));
         let back = back.unwrap();
         prop_assert!(same(&trace, &back), "{trace:?}\n{back:?}");
-        let mut again = Vec::new();
-        back.write(&mut again).unwrap();
-        prop_assert_eq!(file, again);
+        let mut rewritten = Vec::new();
+        back.write(&mut rewritten).unwrap();
+        prop_assert_eq!(file, rewritten);
     }
 
     #[test]

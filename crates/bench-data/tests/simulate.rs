@@ -245,7 +245,7 @@ fn a_person_follows_a_protocol_late_and_reaches_its_positions() {
 }
 
 #[test]
-fn a_person_errs_as_much_as_is_said() {
+fn a_person_errs_as_much_as_stated() {
     let person = Person { mark_sd: 0.05, missed: 0.0, cut_short: 0.0 };
     let mut squares = Vec::new();
     for seed in 0..60 {

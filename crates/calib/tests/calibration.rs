@@ -159,8 +159,8 @@ fn calibration_makes_a_filter_that_beats_the_static_inverse_and_knows_how_far() 
     wide.estimators.values_mut().for_each(|of| of.strain_sd_scale = LARGEST_SD_SCALE);
     assert_eq!(wide.widened_most(), ["filter"]);
     // Same samples, same parameters.
-    let again = calibrate(&[training], &[LawOptions::default()], &[EstimatorKind::Ekf], |_| ()).unwrap();
-    assert_eq!((again.law, again.estimators), (calibration.law, calibration.estimators));
+    let repeated = calibrate(&[training], &[LawOptions::default()], &[EstimatorKind::Ekf], |_| ()).unwrap();
+    assert_eq!((repeated.law, repeated.estimators), (calibration.law, calibration.estimators));
 }
 
 #[test]

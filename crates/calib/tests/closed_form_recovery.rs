@@ -74,7 +74,7 @@ fn several_speeds_tell_the_dash_pot_from_the_offset() {
 }
 
 #[test]
-fn at_one_speed_they_are_not_told_apart() {
+fn at_one_speed_they_are_not_distinguished() {
     let data = session(0.03, TRUTH[1].1, &mut gaussian(1));
     let law = ClosedForm::Eq8And9.law(ModulusShape::SINGLE, true, f64::NAN);
     let fit = fit_closed_form(law.as_ref(), &data).unwrap();

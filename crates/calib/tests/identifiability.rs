@@ -70,9 +70,10 @@ fn one_speed_hides_the_dash_pot_and_a_second_one_shows_it() {
     };
     let one = examined(&law(4.0), legs([0.03, 0.03]), 1e-3);
     let two = examined(&law(4.0), legs([0.03, 0.09]), 1e-3);
-    let said = |found: &Identifiability| found.advice.iter().any(|line| line.contains("at a second speed"));
-    assert!(said(&one), "{one}");
-    assert!(!said(&two), "{two}");
+    let advises_second_speed =
+        |found: &Identifiability| found.advice.iter().any(|line| line.contains("at a second speed"));
+    assert!(advises_second_speed(&one), "{one}");
+    assert!(!advises_second_speed(&two), "{two}");
     assert!(one.condition_number > 100.0 * two.condition_number, "{one}{two}");
     // The errors agree. At one speed, only the rows in which it turns around distinguish the dash-pot from R₀.
     let error = |found: &Identifiability, name: &str| {

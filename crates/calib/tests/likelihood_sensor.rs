@@ -122,7 +122,7 @@ fn known_noise_is_found_within_its_standard_errors() {
 }
 
 #[test]
-fn what_the_electronics_add_is_not_found_again() {
+fn noise_of_the_electronics_is_not_counted_twice() {
     let (time_s, value) = simulate(1, 1000);
     let at = |own: f64, extra_sd: &[f64]| {
         let mut start = NoiseStart { noise: TRUE_NOISE, motion: TRUE_MOTION };

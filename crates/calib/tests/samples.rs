@@ -33,8 +33,8 @@ fn the_row_to_blame_is_named() {
     assert_eq!(refused(|columns| columns[1][3] = 0.0), SamplesError::Reading { row: 3, reading: 0.0 });
     assert!(matches!(refused(|columns| columns[1][2] = f64::INFINITY), SamplesError::Reading { row: 2, .. }));
     assert!(matches!(refused(|columns| columns[2][1] = f64::NEG_INFINITY), SamplesError::Strain { row: 1, .. }));
-    let said = refused(|columns| columns[0][5] = columns[0][4]).to_string();
-    assert_eq!(said, "row 5: expected a time after 0.4 s, found 0.4 s");
+    let message = refused(|columns| columns[0][5] = columns[0][4]).to_string();
+    assert_eq!(message, "row 5: expected a time after 0.4 s, found 0.4 s");
 }
 
 #[test]

@@ -179,7 +179,7 @@ mod tests {
     use super::{deviation, header, is_reference, reading, reference};
 
     #[test]
-    fn columns_are_told_by_their_endings() {
+    fn columns_are_recognised_by_their_endings() {
         assert!(reading("knit1_ratio").is_some_and(|(name, _)| name == "knit1"));
         assert!(reading("_ohm").is_none() && reading("ohm").is_none() && reading("time_s").is_none());
         assert_eq!(reference("angle_deg"), Some(("", "angle_deg")));

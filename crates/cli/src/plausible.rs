@@ -7,7 +7,11 @@ use crate::error::CliError;
 use crate::messages::Messages;
 
 /// Refuses doubts that need an answer, and warns of the others.
-pub fn heed(recordings: &[TraceFile], doubts: &[CalibrationDoubt], messages: &Messages) -> Result<(), CliError> {
+pub fn refuse_or_warn(
+    recordings: &[TraceFile],
+    doubts: &[CalibrationDoubt],
+    messages: &Messages,
+) -> Result<(), CliError> {
     for doubt in doubts {
         let text = doubt_text(doubt, recordings);
         if doubt.is_refusal() {

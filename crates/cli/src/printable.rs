@@ -53,7 +53,7 @@ mod tests {
     use super::{printable, printable_json, printable_lines};
 
     #[test]
-    fn what_a_terminal_obeys_is_escaped_and_nothing_else() {
+    fn only_control_characters_of_a_terminal_are_escaped() {
         let plain = "it's `C:\\x` \"5 Ω ± 2 %\" für 日本 u\u{308}";
         assert_eq!(printable(plain), plain);
         let cases = [

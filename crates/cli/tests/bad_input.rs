@@ -168,7 +168,7 @@ fn a_foreign_cell_does_not_garble_the_message() {
 }
 
 #[test]
-fn a_reference_that_teaches_nothing_is_refused() {
+fn a_reference_without_information_is_refused() {
     let bench = Bench::calibrated();
     let trace = bench.read("trace.csv");
     let header_line = header_line(&trace);

@@ -66,14 +66,17 @@ fn warnings_are_their_own_recordings() {
     let beyond: String = (0..200).map(|second| format!("{},20000,0\n", 90_000 + second)).collect();
     bench.write("in/b.csv", bench.read("in/b.csv") + &beyond);
     bench.run(&[&SMOOTH[..], &["--summary", "json", "--jobs", "3"]].concat()).ok();
-    let said = bench.run(&["smooth", "in/b.csv", "--sensor", "sensor.toml"]).warnings;
-    let said: Vec<&str> = said.iter().map(|line| line.trim_end().trim_start_matches("ohmstrain: warning: ")).collect();
+    let printed = bench.run(&["smooth", "in/b.csv", "--sensor", "sensor.toml"]).warnings;
+    let printed: Vec<&str> =
+        printed.iter().map(|line| line.trim_end().trim_start_matches("ohmstrain: warning: ")).collect();
     let warnings = |row: &serde_json::Value| row["warnings"].as_str().map(str::to_owned);
     let rows = summary(&bench);
-    assert_eq!(warnings(&rows[1]), Some(said.join("; ")));
+    assert_eq!(warnings(&rows[1]), Some(printed.join("; ")));
     assert!(
-        said.iter().any(|said| said.starts_with("in/b.csv: at 900") && said.contains("resistance_ohm is outside of")),
-        "{said:?}"
+        printed
+            .iter()
+            .any(|printed| printed.starts_with("in/b.csv: at 900") && printed.contains("resistance_ohm is outside of")),
+        "{printed:?}"
     );
     assert_eq!((warnings(&rows[0]), warnings(&rows[2])), (None, None));
     // `-q` applies to the command, not to the batch.
@@ -114,7 +117,7 @@ fn what_is_done_is_done_once() {
 
 /// One mistyped name is one message.
 #[test]
-fn a_sensor_that_is_none_is_said_once() {
+fn an_invalid_sensor_is_reported_once() {
     let bench = folder();
     bench.write("old.toml", "format = 1\n");
     for (sensor, why) in [("mistyped.toml", "cannot read mistyped.toml"), ("old.toml", "old.toml:1: field `format`")] {
@@ -140,7 +143,7 @@ fn a_folder_is_pointed_to_a_pattern() {
 }
 
 #[test]
-fn what_is_left_of_an_earlier_run_is_said_to_be() {
+fn outputs_left_from_an_earlier_run_are_reported() {
     let bench = folder();
     bench.run(&SMOOTH).ok();
     let before = bench.read("out/b.csv");
@@ -247,9 +250,9 @@ fn parquet_holds_the_same_numbers() {
     assert!(bytes < text.len() as u64, "{bytes} of {}", text.len());
     // Estimates contain time and readings, so that they are a recording again, and give the same estimates.
     for command in ["filter", "smooth"] {
-        let again = bench.run(&[command, "out/b.parquet", "--sensor", "sensor.toml"]).ok();
+        let repeated = bench.run(&[command, "out/b.parquet", "--sensor", "sensor.toml"]).ok();
         let first = bench.run(&[command, "in/b.csv", "--sensor", "sensor.toml"]).ok();
-        assert_eq!(again, first, "{command}");
+        assert_eq!(repeated, first, "{command}");
     }
     let evaluated = |file: &str| bench.run(&["evaluate", file, "--sensor", "sensor.toml"]).ok();
     let lines = |text: String| text.lines().skip(1).map(str::to_owned).collect::<Vec<_>>();

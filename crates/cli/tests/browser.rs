@@ -44,9 +44,9 @@ fn open(browser: &Path, bench: &Bench, page: &str, arguments: &[&str]) -> String
     let mut command = Command::new(browser);
     command.args(usual).args([profile.as_str(), "--virtual-time-budget=3000"]).args(arguments);
     let done = command.arg(format!("file://{}", bench.path(page).display())).output().unwrap();
-    let said = String::from_utf8_lossy(&done.stderr);
-    let complaints: Vec<&str> = said.lines().filter(|line| line.contains("CONSOLE")).collect();
-    assert!(done.status.success() && complaints.is_empty(), "{page}: {complaints:?}\n{said}");
+    let stderr = String::from_utf8_lossy(&done.stderr);
+    let complaints: Vec<&str> = stderr.lines().filter(|line| line.contains("CONSOLE")).collect();
+    assert!(done.status.success() && complaints.is_empty(), "{page}: {complaints:?}\n{stderr}");
     String::from_utf8_lossy(&done.stdout).into_owned()
 }
 

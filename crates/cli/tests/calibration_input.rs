@@ -173,7 +173,7 @@ fn another_unit_is_asked_about_and_converted() {
 
 /// Readings and reference under each other's name are reported.
 #[test]
-fn exchanged_columns_are_told() {
+fn exchanged_columns_are_reported() {
     let bench = bench();
     let exchanged = change_rows(&bench.read("trace.csv"), |_, cells| {
         // Zero strain would not be a valid resistance, and is refused as such.
@@ -292,7 +292,7 @@ fn a_reference_that_may_be_early_is_warned_of() {
 
 /// A lag of two rows, 0.4 s, against movements of 7 s: too little for a refusal; it is reported with all other findings.
 #[test]
-fn a_reference_that_is_a_little_late_is_told_of() {
+fn a_reference_that_is_a_little_late_is_reported() {
     let bench = Bench::new();
     let simulate = ["simulate", "--protocol", "mixed", "--speed-mm-s", "2", "--sample-rate-hz", "5", "--mismatched"];
     bench.run(&[&simulate[..], &["-o", "trace.csv"]].concat()).ok();
@@ -305,8 +305,8 @@ fn a_reference_that_is_a_little_late_is_told_of() {
         assert_eq!(run.code, Some(0), "{}", run.stderr);
         run.stderr
     };
-    let said = "late.csv: the reference seems to be 0.4";
-    assert!(!calibrate(&[]).contains(said));
+    let remark = "late.csv: the reference seems to be 0.4";
+    assert!(!calibrate(&[]).contains(remark));
     let verbose = calibrate(&["--verbose", "--force"]);
-    assert!(verbose.contains(said), "{verbose}");
+    assert!(verbose.contains(remark), "{verbose}");
 }

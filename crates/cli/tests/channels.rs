@@ -103,7 +103,7 @@ fn a_channel_that_fails_leaves_the_others() {
 }
 
 #[test]
-fn what_is_wrong_with_several_channels_is_said() {
+fn errors_in_several_channels_are_reported() {
     let bench = bench();
     bench.write("bare.csv", bench.read("knee.csv").replace(",strain\n", ",x\n"));
     bench.write("other.csv", bench.read("knee.csv").replace("outer_ohm", "thigh_ohm"));

@@ -36,8 +36,8 @@ fn sd_scale(bench: &Bench, field: &str) -> f64 {
 fn smoother_and_filter_share_header_and_last_row_and_nothing_in_between() {
     let bench = Bench::calibrated();
     // An R₀ that adapts to the readings has adapted by their end only in the filter.
-    let told = ["--sensor", "sensor.toml", "--without", "doubts", "--rest-resistance", "calibrated"];
-    let estimates = |command| Csv::new(&bench.run(&[&[command, "trace.csv"][..], &told].concat()).ok());
+    let flags = ["--sensor", "sensor.toml", "--without", "doubts", "--rest-resistance", "calibrated"];
+    let estimates = |command| Csv::new(&bench.run(&[&[command, "trace.csv"][..], &flags].concat()).ok());
     let (filtered, smoothed) = (estimates("filter"), estimates("smooth"));
     assert_eq!(filtered.header, ESTIMATES_HEADER);
     assert_eq!(smoothed.header, ESTIMATES_HEADER);
@@ -142,9 +142,9 @@ fn a_joint_appends_its_angle() {
     // From the recording, or from a flag of `filter` and of `import`, which overrides it.
     let flag = ["--joint", "prestrain=0 moment_arm_mm=-3 gauge_length_mm=30"];
     bench.run(&[&["-q", "import", "other.csv", "-o", "imported.csv"], &flag[..]].concat()).ok();
-    for (command, recording, told) in [("filter", "other.csv", &flag[..]), ("smooth", "imported.csv", &[])] {
+    for (command, recording, flags) in [("filter", "other.csv", &flag[..]), ("smooth", "imported.csv", &[])] {
         assert_angles(&Csv::new(&bench.run(&[command, "other.csv", "--sensor", "sensor.toml"]).ok()), 0.02, 0.2);
-        let run = bench.run(&[&[command, recording, "--sensor", "other.toml"], told].concat());
+        let run = bench.run(&[&[command, recording, "--sensor", "other.toml"], flags].concat());
         assert_angles(&Csv::new(&run.ok()), 0.0, -0.1);
     }
 }
@@ -236,22 +236,31 @@ fn a_strain_that_is_known_is_taken_in() {
             let strains = estimates.numbers("strain");
             (strains.iter().zip(&truth).map(|(strain, truth)| (strain - truth).abs()).collect(), estimates)
         };
-        let (untold, estimates) = errors(&[]);
-        let worst = (50..untold.len() - 10).max_by(|a, b| untold[*a].total_cmp(&untold[*b])).unwrap();
+        let (without_known, estimates) = errors(&[]);
+        let worst =
+            (50..without_known.len() - 10).max_by(|a, b| without_known[*a].total_cmp(&without_known[*b])).unwrap();
         // At a time between two rows, the strain applies to the next row.
         let time_s = estimates.numbers("time_s")[worst] - 0.01;
         let known = format!("{time_s}:{}:0.001", truth[worst]);
-        let (told, estimates) = errors(&["--known", &known]);
+        let (with_known, estimates) = errors(&["--known", &known]);
         let mean = |errors: &[f64]| errors.iter().sum::<f64>() / errors.len() as f64;
         let smoothed = if lag.is_empty() { 0.0 } else { sd_scale(&bench, "smoothed_sd_scale") };
         let sd = estimates.numbers("strain_sd")[worst] / sd_scale(&bench, "strain_sd_scale").max(smoothed);
         // Four deviations of the known strain.
-        assert!(told[worst] < 0.004 && sd < 1.001e-3, "{lag:?}: {} ± {sd}, was {}", told[worst], untold[worst]);
-        assert!(mean(&told[worst..worst + 5]) < 0.7 * mean(&untold[worst..worst + 5]), "{lag:?}: {told:?}");
+        assert!(
+            with_known[worst] < 0.004 && sd < 1.001e-3,
+            "{lag:?}: {} ± {sd}, was {}",
+            with_known[worst],
+            without_known[worst]
+        );
+        assert!(
+            mean(&with_known[worst..worst + 5]) < 0.7 * mean(&without_known[worst..worst + 5]),
+            "{lag:?}: {with_known:?}"
+        );
         if lag.is_empty() {
-            assert_eq!(told[..worst], untold[..worst]);
+            assert_eq!(with_known[..worst], without_known[..worst]);
         } else {
-            assert!(told[worst - 1] < untold[worst - 1]);
+            assert!(with_known[worst - 1] < without_known[worst - 1]);
         }
     }
     // After the end of the recording it is not used, and a message says so.
@@ -275,10 +284,11 @@ fn a_smoother_takes_in_a_strain_that_is_known() {
         let run = bench.run(&[&["smooth", "trace.csv", "--sensor", "sensor.toml"], flags].concat());
         (run.warnings.clone(), Csv::new(&run.ok()).numbers("strain"))
     };
-    let (_, untold) = smoothed(&[]);
-    let known = format!("100:{}", untold[500] + 0.02);
-    let (warnings, told) = smoothed(&["--known", &known, "--known", "5000:0.1"]);
-    let more: Vec<f64> = told.iter().zip(&untold).map(|(told, untold)| told - untold).collect();
+    let (_, without_known) = smoothed(&[]);
+    let known = format!("100:{}", without_known[500] + 0.02);
+    let (warnings, with_known) = smoothed(&["--known", &known, "--known", "5000:0.1"]);
+    let more: Vec<f64> =
+        with_known.iter().zip(&without_known).map(|(with_known, without_known)| with_known - without_known).collect();
     assert!((more[500] - 0.02).abs() < 0.003 && more[497] > 0.005 && more[503] > 0.005, "{:?}", &more[495..506]);
     assert!(warnings.iter().any(|warning| warning.contains("--known 5000:0.1 was not used")), "{warnings:?}");
 }

@@ -70,11 +70,11 @@ fn known_strains_are_scored_beside() {
     let bench = simulated(&["1"]);
     let flags = ["--split", "0.5", "--estimator", "ekf", "1.csv"];
     let alone = evaluate(&bench, &flags);
-    let told = evaluate(&bench, &[&flags[..], &["--known-every", "5"]].concat());
-    let names: Vec<&Value> = told.iter().map(|scores| &scores["known"]).collect();
+    let with_known = evaluate(&bench, &[&flags[..], &["--known-every", "5"]].concat());
+    let names: Vec<&Value> = with_known.iter().map(|scores| &scores["known"]).collect();
     assert_eq!(names, [&Value::Null, &Value::from("known every 5 s"), &Value::from("rest and stretch known")]);
-    assert_same_scores(&told[0], &alone[0]);
-    assert!(number(&told[1]["smoother"], "rmse") < number(&told[0]["smoother"], "rmse"));
+    assert_same_scores(&with_known[0], &alone[0]);
+    assert!(number(&with_known[1]["smoother"], "rmse") < number(&with_known[0]["smoother"], "rmse"));
     let table = bench.run(&[&["evaluate", "--known-every", "5"], &flags[..]].concat()).ok();
     assert!(table.contains("ekf, known every 5 s") && table.contains("known: the reference told"), "{table}");
 }

@@ -205,7 +205,7 @@ fn scored_export(bench: &Bench, estimator: &str) -> String {
 /// With a ten-thousandth of the gains and the noise, some steps are refused in single precision and repeated. Otherwise the C
 /// code would give other results.
 #[test]
-fn steps_that_are_refused_are_taken_again_alike() {
+fn refused_steps_are_repeated_alike() {
     const QUIETER: [&str; 9] = [
         "extend_gain",
         "retract_gain",
@@ -338,8 +338,8 @@ fn a_promise_is_of_the_default() {
         for flag in ["-ffast-math", "-ffinite-math-only"] {
             let compile = [flag, "-std=c99", "-fsyntax-only", "src/ohmstrain.c"];
             let compiled = Command::new(compiler).current_dir(bench.path("out")).args(compile).output().unwrap();
-            let said = String::from_utf8_lossy(&compiled.stderr);
-            assert!(!compiled.status.success() && said.contains("not finite"), "{compiler}, {flag}: {said}");
+            let message = String::from_utf8_lossy(&compiled.stderr);
+            assert!(!compiled.status.success() && message.contains("not finite"), "{compiler}, {flag}: {message}");
         }
     }
 }
@@ -430,7 +430,7 @@ fn what_has_no_exported_form_is_refused_and_nothing_is_written() {
 /// With it, the exported code repeats its estimates, since R/R₀ is the same to a rounding error of 6e-8. (R₀ of the law differs
 /// from the reading of the rested sensor, here by some per cent.)
 #[test]
-fn another_days_resistance_at_rest_can_be_told() {
+fn another_days_resistance_at_rest_can_be_given() {
     let bench = every_filter();
     let sensor = bench.read("corrected.toml");
     let rested = sensor.lines().find_map(|line| line.strip_prefix("measured_rest = ")).unwrap();
@@ -445,32 +445,32 @@ fn another_days_resistance_at_rest_can_be_told() {
     let program = Csv::new(&bench.run(&["filter", "larger.csv", "--sensor", "corrected.toml"]).ok()).numbers("strain");
     for compiler in compilers() {
         let sources = ["src/ohmstrain.c", "selftest/replay.c"];
-        let replay = |factor: f64, told: &[&str]| {
+        let replay = |factor: f64, rest: &[&str]| {
             let recording = format!("time_s,resistance_ohm\n{}", rows(factor));
             let program = compile(compiler, &bench.path("corrected"), &sources, "program.out");
-            Csv::new(&run_program(&program, &recording, told)).numbers("strain")
+            Csv::new(&run_program(&program, &recording, rest)).numbers("strain")
         };
-        let (expected, told, untold) = (replay(1.0, &[]), replay(1.15, &[&today.to_string()]), replay(1.15, &[]));
+        let (expected, given, not_given) = (replay(1.0, &[]), replay(1.15, &[&today.to_string()]), replay(1.15, &[]));
         let farthest = |strains: &[f64], expected: &[f64]| {
             strains.iter().zip(expected).map(|(strain, expected)| (strain - expected).abs()).fold(0.0, f64::max)
         };
-        let off = [farthest(&told, &expected), farthest(&untold, &expected)];
+        let off = [farthest(&given, &expected), farthest(&not_given, &expected)];
         // While R₀ is wrong, hypotheses are nearly equally likely for longer, and readings are outside the correction's
         // training range. Some rows may follow another hypothesis, far fewer than have another strain if R₀ is given.
         let apart =
             |some: &[f64], others: &[f64]| some.iter().zip(others).filter(|(a, b)| (*a - *b).abs() > 0.003).count();
-        let unlike = |others: &[f64]| apart(&untold, others);
-        let rows = untold.len();
+        let unlike = |others: &[f64]| apart(&not_given, others);
+        let rows = not_given.len();
         println!(
             "{compiler}: {off:?}, of {rows} rows {} are not the program's, {} not those told",
             unlike(&program),
-            unlike(&told)
+            unlike(&given)
         );
         // Two hypotheses may be merged some rows earlier or later, since readings round differently: few rows, and small
         // differences.
         assert!(2.0 * off[0] < off[1] && off[1] > 0.03, "{off:?}");
-        assert!(10 * apart(&told, &expected) < unlike(&expected), "{} rows", apart(&told, &expected));
-        assert!(5 * unlike(&program) < unlike(&told) && 2 * unlike(&told) > rows);
+        assert!(10 * apart(&given, &expected) < unlike(&expected), "{} rows", apart(&given, &expected));
+        assert!(5 * unlike(&program) < unlike(&given) && 2 * unlike(&given) > rows);
     }
 }
 

@@ -53,7 +53,7 @@ fn a_smaller_filter_fits_and_is_its_twin() {
 }
 
 #[test]
-fn what_does_not_fit_is_said() {
+fn exceeded_resources_are_reported() {
     let bench = every_filter();
     let export = ["export", "--dt-s", DT_S, "--sensor", "corrected.toml", "-o", "none", "--budget"];
     let c = |budget: &str, more: &[&str]| bench.run(&[&export[..], &[budget], more].concat());
@@ -73,7 +73,7 @@ fn what_does_not_fit_is_said() {
 /// All candidates are printed with their costs, and the resource that the next better one exceeds, in the order of the table or
 /// of their errors.
 #[test]
-fn candidates_and_what_keeps_the_next_better_one_out_are_said() {
+fn candidates_and_the_limit_of_the_next_better_one_are_printed() {
     let bench = every_filter();
     let export = ["export", "--dt-s", DT_S, "--sensor", "corrected.toml", "--target", "c", "-o", "asked", "--force"];
     let printed = bench.run(&[&export[..], &["--budget", "flash=33000"]].concat()).ok();
@@ -157,8 +157,8 @@ fn the_compiled_program_answers_faults_as_its_twin() {
             for compiler in compilers() {
                 let sources = ["src/ohmstrain.c", "selftest/replay.c"];
                 let folder = bench.path("faulty");
-                let said = Csv::new(&compile_and_run(compiler, &folder, &sources, &bench.read("fault.csv")));
-                let strain = said.numbers("strain");
+                let estimates = Csv::new(&compile_and_run(compiler, &folder, &sources, &bench.read("fault.csv")));
+                let strain = estimates.numbers("strain");
                 let squares: f64 = strain.iter().zip(&truth).map(|(strain, truth)| (strain - truth).powi(2)).sum();
                 let found = 100.0 * (squares / truth.len() as f64).sqrt() / (range.1 - range.0);
                 println!("{name}, {budget}, {compiler}: {found:.2}");

@@ -95,8 +95,8 @@ fn a_pause_of_any_length_is_answered_as_by_the_program() {
         let programs: Vec<_> = compilers().into_iter().map(program).collect();
         bench.write("c/any.c", ANY);
         for compiler in compilers() {
-            let said = compile_and_run(compiler, &bench.path("c"), &["src/ohmstrain.c", "any.c"], "");
-            answers.push(format!("{estimator}, {compiler}: {said}"));
+            let printed = compile_and_run(compiler, &bench.path("c"), &["src/ohmstrain.c", "any.c"], "");
+            answers.push(format!("{estimator}, {compiler}: {printed}"));
         }
         for (before, pause_s) in [0, BEFORE].into_iter().flat_map(|before| PAUSES_S.map(|pause_s| (before, pause_s))) {
             let recording = recording(before, pause_s);
@@ -104,12 +104,12 @@ fn a_pause_of_any_length_is_answered_as_by_the_program() {
             let filter = ["--quiet", "filter", "paused.csv", "--sensor", "sensor.toml", "--estimator", estimator];
             let expected = since_the_pause(&bench.run(&filter).ok(), before);
             for program in &programs {
-                let said = since_the_pause(&run_program(program, &recording, &[]), before);
-                let off = |(said, expected): (&(f64, f64), &(f64, f64))| {
-                    ((said.0 - expected.0) / expected.1).abs().max((said.1 / expected.1 - 1.0).abs())
+                let found = since_the_pause(&run_program(program, &recording, &[]), before);
+                let off = |(found, expected): (&(f64, f64), &(f64, f64))| {
+                    ((found.0 - expected.0) / expected.1).abs().max((found.1 / expected.1 - 1.0).abs())
                 };
-                assert_eq!(said.len(), 1 + AFTER);
-                let offs: Vec<f64> = said.iter().zip(&expected).map(off).collect();
+                assert_eq!(found.len(), 1 + AFTER);
+                let offs: Vec<f64> = found.iter().zip(&expected).map(off).collect();
                 let after = offs[1..].iter().copied().fold(0.0, f64::max);
                 println!("{estimator}, {before} rows, {pause_s} s: {:.1e}, {after:.1e} after it", offs[0]);
                 worst.push((estimator, offs[0], after));

@@ -39,8 +39,8 @@ fn calibrate(bench: &Bench, trace: &str, until_s: &str, sensor: &str, flags: &[&
 /// Returns the error after the calibration, percent of the range, and the interval's coverage.
 fn score(bench: &Bench, sensor: &str) -> (f64, f64) {
     let words = ["evaluate", "9.csv", "--sensor", sensor, "--from", CALIBRATED_S, "--json"];
-    let said: Value = serde_json::from_str(&bench.run(&words).ok()).unwrap();
-    let of = |name: &str| said["recordings"][0][name].as_f64().unwrap();
+    let scores: Value = serde_json::from_str(&bench.run(&words).ok()).unwrap();
+    let of = |name: &str| scores["recordings"][0][name].as_f64().unwrap();
     (of("rmse_percent_fs"), of("coverage_95"))
 }
 
@@ -49,8 +49,8 @@ fn score(bench: &Bench, sensor: &str) -> (f64, f64) {
 #[test]
 fn a_short_motion_is_enough_with_a_prior() {
     let bench = fleet();
-    let again = ["-q", "fleet", "fit", "1.toml", "2.toml", "3.toml", "4.toml", "-o", "again.toml"];
-    bench.run(&again).ok();
+    let refit = ["-q", "fleet", "fit", "1.toml", "2.toml", "3.toml", "4.toml", "-o", "again.toml"];
+    bench.run(&refit).ok();
     assert_eq!(bench.read("again.toml"), bench.read("prior.toml"));
     calibrate(&bench, "9.csv", "10", "alone.toml", &[]);
     calibrate(&bench, "9.csv", "10", "taught.toml", &["--prior", "prior.toml"]);
@@ -101,8 +101,8 @@ fn a_batch_learns_from_a_prior() {
     assert!(!bench.read("out/batch.jsonl").contains(".batch-"), "what is said of a draft names the output");
     assert_eq!(state(&taught, 5), ("kept".to_owned(), of_prior.clone()));
     bench.run(&["-q", "fleet", "fit", "1.toml", "2.toml", "3.toml", "-o", "prior.toml", "--force"]).ok();
-    let (again, of_another) = state(&taught, 5);
-    assert_eq!(again, "done");
+    let (redone, of_another) = state(&taught, 5);
+    assert_eq!(redone, "done");
     assert!(of_another.is_some() && of_another != of_prior);
     // A prior in a manifest is relative to the manifest, as recordings are.
     state(&[&batch[..], &["--manifest", "rig/manifest.csv", "--"], &flags].concat(), 0);

@@ -7,16 +7,16 @@ const EVIL: &str = "\u{1b}[31mred\u{9b}2J\u{202e}vsc";
 
 #[track_caller]
 fn assert_printable(run: &Run) {
-    let said = [&run.stdout, &run.stderr, &run.warnings.concat()].map(String::as_str).concat();
+    let output = [&run.stdout, &run.stderr, &run.warnings.concat()].map(String::as_str).concat();
     let is_shown = |c: char| c == '\n' || !(c.is_control() || ('\u{202a}'..='\u{202e}').contains(&c));
-    assert!(said.chars().all(is_shown), "{}: {said:?}", run.command);
+    assert!(output.chars().all(is_shown), "{}: {output:?}", run.command);
     // The argument parser drops the colour.
     let shown = ["\\u{1b}[31mred", "\\u001b[31mred", "red\\u{9b}2J"];
-    assert!(shown.iter().any(|shown| said.contains(shown)), "{}: {said}", run.command);
+    assert!(shown.iter().any(|shown| output.contains(shown)), "{}: {output}", run.command);
 }
 
 #[test]
-fn what_is_said_of_files_can_be_printed() {
+fn messages_about_files_are_printable() {
     let bench = Bench::calibrated();
     let name = if cfg!(windows) { "evil.csv".to_owned() } else { format!("{EVIL}.csv") };
     let rows: String = (0..40).map(|row| format!("{}.5,{},{}\n", row, 1600 + row % 7, row % 5)).collect();

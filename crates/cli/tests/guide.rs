@@ -37,8 +37,8 @@ fn run(chapter: &str) -> TempDir {
     let path = env::join_paths([own].into_iter().chain(env::split_paths(&env::var_os("PATH").unwrap_or_default())));
     let mut shell = Command::new("sh");
     let done = shell.args(["-c", &script]).current_dir(folder.path()).env("PATH", path.unwrap()).output().unwrap();
-    let said = String::from_utf8_lossy(&done.stderr);
-    assert!(done.status.success(), "{chapter}: {said}\n{script}");
+    let stderr = String::from_utf8_lossy(&done.stderr);
+    assert!(done.status.success(), "{chapter}: {stderr}\n{script}");
     folder
 }
 

@@ -104,7 +104,7 @@ fn all_angles_of_a_hand() {
 /// A sensor calibrated on ratios but given ohms, or the reverse, is detected by the column's name, the electronics, the line
 /// above the header, or the readings themselves, however few. So is an R0 that cannot be the sensor's.
 #[test]
-fn ohms_and_ratios_are_told_apart() {
+fn ohms_and_ratios_are_distinguished() {
     let bench = Bench::calibrated();
     let ratio = change_rows(&bench.read("trace.csv"), |_, cells| {
         cells[1] = (cells[1].parse::<f64>().unwrap() / 1600.0).to_string();
@@ -124,9 +124,9 @@ fn ohms_and_ratios_are_told_apart() {
         bench.write("hand.csv", recording);
         bench.run(&["hand", "hand.toml", "hand.csv"])
     };
-    let refused = |run: Run, said: &[&str]| {
+    let refused = |run: Run, expected: &[&str]| {
         assert_eq!(run.code, Some(4), "{}", run.stderr);
-        assert!(said.iter().all(|said| run.stderr.contains(said)), "{}", run.stderr);
+        assert!(expected.iter().all(|expected| run.stderr.contains(expected)), "{}", run.stderr);
     };
     let (ohm, all) = ("trace.csv", usize::MAX);
     let named = ["hand.csv:1: column", "joint `a`", "expected `resistance_ratio` as in the sensor's calibration"];
@@ -134,8 +134,8 @@ fn ohms_and_ratios_are_told_apart() {
     refused(hand("ratio.toml", "thumb_kohm", "", recording(ohm, "thumb_kohm", all)), &named);
     let electronics = "front_end = \"divider reference_ohm=10000 side=low bits=12 noise_codes=0.5\"\n";
     refused(hand("ratio.toml", "thumb", electronics, recording(ohm, "thumb", all)), &named);
-    let said = "# resistance_unit = ohm\n".to_owned() + &recording(ohm, "thumb", all);
-    refused(hand("ratio.toml", "thumb", "", said), &named[1..]);
+    let with_unit = "# resistance_unit = ohm\n".to_owned() + &recording(ohm, "thumb", all);
+    refused(hand("ratio.toml", "thumb", "", with_unit), &named[1..]);
     let expected = ["joint `a`", "expected readings of", "are they in ohms?"];
     refused(hand("ratio.toml", "thumb", "", recording(ohm, "thumb", all)), &expected);
     refused(hand("ratio.toml", "thumb", "", recording(ohm, "thumb", 5)), &expected);
@@ -160,11 +160,11 @@ fn a_plan_says_what_recordings_tell_and_what_sampling_leaves() {
     let json = bench.run(&["plan", "--sensor", "sensor.toml", "--joint", JOINT, "--json"]).ok();
     let plan: serde_json::Value = serde_json::from_str(&json).unwrap();
     let recordings = plan["recordings"].as_array().unwrap();
-    let told = |place: usize| recordings[place]["told"].as_u64().unwrap();
+    let determined = |place: usize| recordings[place]["told"].as_u64().unwrap();
     let condition = |place: usize| recordings[place]["condition"].as_f64().unwrap();
     // At a single speed, rate and strain are correlated; each further recording separates them better. One speed determines
     // fewer parameters than three with holds.
-    assert!(recordings.len() == 4 && told(0) <= told(3) && condition(0) > 100.0 * condition(3), "{json}");
+    assert!(recordings.len() == 4 && determined(0) <= determined(3) && condition(0) > 100.0 * condition(3), "{json}");
     let sampling = plan["sampling"].as_array().unwrap();
     assert_eq!(sampling.len(), 16);
     for one in sampling {
@@ -190,7 +190,7 @@ fn a_plan_says_what_recordings_tell_and_what_sampling_leaves() {
 
 /// A board that restarts, with its header or without, restarts the filters of all joints.
 #[test]
-fn filters_of_all_joints_start_again_with_the_clock() {
+fn filters_of_all_joints_restart_with_the_clock() {
     let bench = Bench::calibrated();
     let joint = |name: &str| {
         format!("[[joints]]\nname = \"{name}\"\ncolumn = \"{name}\"\nsensor = \"sensor.toml\"\njoint = \"{JOINT}\"\n")

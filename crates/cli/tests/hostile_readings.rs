@@ -41,7 +41,7 @@ fn an_overload_is_a_missing_reading() {
 /// Readings that a gate rejects for two seconds do not end a run, and half a minute later the estimate is as it would have
 /// been.
 #[test]
-fn an_unplugged_sensor_is_found_again() {
+fn an_unplugged_sensor_is_recovered() {
     let bench = Bench::calibrated();
     let clean = estimates(&bench, &["filter"], "trace.csv").numbers("strain");
     for resistance in ["8000", "300"] {

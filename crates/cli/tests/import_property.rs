@@ -159,11 +159,11 @@ fn import(bench: &Bench, file: &str) -> Result<Csv, String> {
     }
     let output = line.trim_end().rsplit_once(' ').unwrap().1;
     // Every command must read the import as a trace.
-    let again = shell("ohmstrain", &["import", output]);
+    let reimport = shell("ohmstrain", &["import", output]);
     let text = bench.read(output);
     let rows = |text: &str| text.lines().filter(|line| !line.starts_with('#')).map(str::to_owned).collect::<Vec<_>>();
-    if rows(&String::from_utf8(again.stdout).unwrap()) != rows(&text) {
-        return Err(format!("{line}the trace does not come back: {}", String::from_utf8_lossy(&again.stderr)));
+    if rows(&String::from_utf8(reimport.stdout).unwrap()) != rows(&text) {
+        return Err(format!("{line}the trace does not come back: {}", String::from_utf8_lossy(&reimport.stderr)));
     }
     Ok(Csv::new(&text))
 }

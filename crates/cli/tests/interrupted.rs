@@ -102,7 +102,7 @@ fn an_ignored_interrupt_stays_ignored() {
     assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
     stdin.write_all(b"0.2,1601\n").unwrap();
     drop(stdin);
-    let said = BufReader::new(child.stderr.take().unwrap()).lines().count();
-    assert!(child.wait().unwrap().success() && said == 0);
+    let printed_lines = BufReader::new(child.stderr.take().unwrap()).lines().count();
+    assert!(child.wait().unwrap().success() && printed_lines == 0);
     assert_eq!(bench.read("out/estimates.csv").lines().count(), 3);
 }

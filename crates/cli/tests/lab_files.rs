@@ -40,12 +40,12 @@ fn what_is_suggested_is_ready_for_a_shell() {
     let bench = Bench::new();
     bench.write("it's a test; rm.csv", export(200));
     let inspect = "ohmstrain inspect --suggest *.csv --gauge-length-mm 30";
-    let (code, line, said) = shell(&bench, inspect);
-    assert_eq!((code, said.as_str()), (Some(0), ""));
+    let (code, line, stderr) = shell(&bench, inspect);
+    assert_eq!((code, stderr.as_str()), (Some(0), ""));
     assert_eq!(line.lines().count(), 1);
-    let (code, printed, said) = shell(&bench, &line);
-    assert_eq!((code, printed.as_str()), (Some(0), ""), "{said}");
-    assert!(said.lines().all(|line| line.starts_with("ohmstrain: ")) && said.contains("resistance = "), "{said}");
+    let (code, printed, stderr) = shell(&bench, &line);
+    assert_eq!((code, printed.as_str()), (Some(0), ""), "{stderr}");
+    assert!(stderr.lines().all(|line| line.starts_with("ohmstrain: ")) && stderr.contains("resistance = "), "{stderr}");
     let trace = Csv::new(&bench.read("trace.csv"));
     assert_eq!(trace.header, "time_s,resistance_ohm,strain");
     assert_eq!(trace.numbers("time_s")[199], 9.95);
@@ -111,8 +111,8 @@ fn an_imported_file_is_a_trace_and_no_input_is_overwritten() {
     bench.run(&[&SIMULATE[..], &["-o", "trace.csv"]].concat()).ok();
     let line = bench.run(&["inspect", "--suggest", "trace.csv"]).ok();
     assert!(line.ends_with("-o imported.csv\n"), "{line}");
-    let (code, _, said) = shell(&bench, &line);
-    assert_eq!(code, Some(0), "{said}");
+    let (code, _, stderr) = shell(&bench, &line);
+    assert_eq!(code, Some(0), "{stderr}");
     let rows =
         |name: &str| bench.read(name).lines().filter(|line| !line.starts_with('#')).collect::<Vec<_>>().join("\n");
     assert_eq!(rows("imported.csv"), rows("trace.csv"));
@@ -136,13 +136,13 @@ fn two_files_are_aligned_and_the_offset_is_printed_with_its_uncertainty() {
     bench.write("stage.csv", reference);
     let line = bench.run(&["inspect", "--suggest", "dmm.csv", "stage.csv"]).ok();
     assert!(line.contains("--align motion") && line.contains("reference-time=2:"), "{line}");
-    let (code, _, said) = shell(&bench, &line.replace("trace.csv", "both.csv"));
-    assert_eq!(code, Some(0), "{said}");
-    let found = said.split_once("the reference's clock plus ").unwrap().1;
+    let (code, _, stderr) = shell(&bench, &line.replace("trace.csv", "both.csv"));
+    assert_eq!(code, Some(0), "{stderr}");
+    let found = stderr.split_once("the reference's clock plus ").unwrap().1;
     let mut words = found.split(' ');
     let offset: f64 = words.next().unwrap().parse().unwrap();
     let sd: f64 = words.nth(1).unwrap().parse().unwrap();
-    assert!((offset + 20.0).abs() < 3.0 * sd + 0.05 && sd < 0.3, "{said}");
+    assert!((offset + 20.0).abs() < 3.0 * sd + 0.05 && sd < 0.3, "{stderr}");
 }
 
 #[test]
@@ -174,12 +174,12 @@ fn remarks_name_every_missing_word_and_come_once() {
         })
         .collect();
     bench.write("rig.csv", format!("t,R (Ohm),eps\n{rows}"));
-    let said = bench.run(&["import", "rig.csv", "-o", "trace.csv"]).stderr;
+    let stderr = bench.run(&["import", "rig.csv", "-o", "trace.csv"]).stderr;
     for word in words {
-        assert!(said.contains(&format!("1 × `{word}`")), "{word}: {said}");
+        assert!(stderr.contains(&format!("1 × `{word}`")), "{word}: {stderr}");
     }
-    let lines: Vec<&str> = said.lines().collect();
-    assert!(lines.iter().enumerate().all(|(k, line)| !lines[..k].contains(line)), "{said}");
+    let lines: Vec<&str> = stderr.lines().collect();
+    assert!(lines.iter().enumerate().all(|(k, line)| !lines[..k].contains(line)), "{stderr}");
 }
 
 #[test]
@@ -229,16 +229,19 @@ fn joints_of_one_file_are_imported_and_calibrated_together() {
     assert!(shown.contains("thumb       `Thumb (kOhm)`, its reference `Thumb angle (deg)`\n"), "{shown}");
     let json = bench.run(&["inspect", "glove.csv", "--json"]).ok();
     assert!(json.contains("\"command\": \"ohmstrain import glove.csv --each -o trace.csv\""), "{json}");
-    let (code, _, said) = shell(&bench, &command);
-    assert!(code == Some(0) && said.contains("index = `Index (kOhm)`, its reference `Index angle (deg)`"), "{said}");
+    let (code, _, stderr) = shell(&bench, &command);
+    assert!(
+        code == Some(0) && stderr.contains("index = `Index (kOhm)`, its reference `Index angle (deg)`"),
+        "{stderr}"
+    );
     let trace = bench.read("trace.csv");
     assert!(
         trace.contains("\ntime_s,thumb_ohm,index_ohm,thumb_angle_deg,index_angle_deg\n0,12000,14000,0,0\n"),
         "{trace}"
     );
     // The output of an earlier import may be replaced.
-    let (code, _, said) = shell(&bench, &command);
-    assert!(code == Some(0), "{said}");
+    let (code, _, stderr) = shell(&bench, &command);
+    assert!(code == Some(0), "{stderr}");
 }
 
 #[test]

@@ -43,8 +43,8 @@ fn lines_come_by_udp() {
         thread::sleep(Duration::from_millis(5));
     }
     live.wait_for("1603");
-    let said = live.quit();
-    assert!(said.contains("4 rows, 0 readings missing") && said.contains("1 line skipped"), "{said}");
+    let summary = live.quit();
+    assert!(summary.contains("4 rows, 0 readings missing") && summary.contains("1 line skipped"), "{summary}");
 }
 
 #[test]
@@ -214,7 +214,7 @@ fn the_keyboard_is_no_port() {
 }
 
 #[test]
-fn a_pipe_is_read_again_when_another_program_writes_into_it() {
+fn a_pipe_is_reopened_when_another_program_writes_into_it() {
     let bench = Bench::calibrated();
     let pipe = bench.path("pipe");
     assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());

@@ -52,7 +52,7 @@ fn what_is_missing_is_shown_in_an_example() {
 }
 
 #[test]
-fn a_recording_and_a_sensor_file_that_are_swapped_are_told_apart() {
+fn a_swapped_recording_and_sensor_file_are_recognised() {
     let bench = Bench::calibrated();
     for command in ["filter", "smooth", "evaluate"] {
         let swapped = "trace.csv is a recording, not a sensor file: give --sensor what `ohmstrain calibrate` wrote, and the \
@@ -69,12 +69,12 @@ fn times_outside_of_a_recording_are_answered_with_its_range() {
     let bench = Bench::calibrated();
     let range = "the recording goes from 0 to 400 s";
     let calibrate = ["calibrate", "trace.csv", "-o", "new.toml"];
-    for (flags, said) in [
+    for (flags, named) in [
         (&["--from", "900"][..], "--from 900"),
         (&["--until", "-5"], "--until -5"),
         (&["--from", "60", "--until", "50"], "--from 60 --until 50"),
     ] {
-        let message = format!("trace.csv: no row is left by {said}; {range}");
+        let message = format!("trace.csv: no row is left by {named}; {range}");
         bench.run(&[&calibrate[..], flags].concat()).fails(4, &message);
         let refine = ["refine", "trace.csv", "--sensor", "sensor.toml", "-o", "new.toml"];
         bench.run(&[&refine[..], flags].concat()).fails(4, &message);
@@ -166,7 +166,7 @@ fn no_table_and_no_help_is_wider_than_a_hundred_columns() {
 
 /// Errors once contained only a name, without the kind of the file.
 #[test]
-fn what_a_file_is_and_what_is_missing_is_said() {
+fn errors_name_the_kind_of_file_and_the_missing_part() {
     let bench = Bench::calibrated();
     let estimates = bench.run(&["filter", "trace.csv", "--sensor", "sensor.toml"]).stdout;
     bench.write("estimates.csv", estimates);

@@ -65,7 +65,7 @@ fn a_file_of_another_kind_is_replaced_only_by_force() {
 
 /// Only outputs that can be made again are replaced: a recording of `live` cannot; a simulation can, and so can an import.
 #[test]
-fn only_what_can_be_made_again_is_replaced() {
+fn only_reproducible_outputs_are_replaced() {
     let bench = Bench::new();
     let rows: String = (0..60).map(|row| format!("{},{},{}\n", row, 1600 + row % 7, row % 5)).collect();
     bench.write("rig.csv", format!("Time (s),Resistance (Ohm),Displacement (mm)\n{rows}"));

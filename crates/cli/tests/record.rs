@@ -62,15 +62,17 @@ fn holds_of_a_person_calibrate_a_sensor() {
     // On another day of the same person, the error is less than twice that of a sensor calibrated on the complete true strain,
     // and the interval is right.
     bench.run(&["calibrate", "board.csv", "--estimator", "ekf", "-o", "stage.toml"]).ok();
-    let again = Csv::new(&bench.read("again.csv")).numbers("strain");
+    let second_truth = Csv::new(&bench.read("again.csv")).numbers("strain");
     let estimates = |sensor: &str| Csv::new(&bench.run(&["filter", "again.csv", "--sensor", sensor]).ok());
     let (marked, staged) = (estimates("sensor.toml"), estimates("stage.toml"));
-    let (marks, stage) =
-        (percent(&marked.numbers("strain"), &again, 0.3), percent(&staged.numbers("strain"), &again, 0.3));
+    let (marks, stage) = (
+        percent(&marked.numbers("strain"), &second_truth, 0.3),
+        percent(&staged.numbers("strain"), &second_truth, 0.3),
+    );
     assert!(marks < 2.0 * stage, "{marks} {stage}");
-    let deviations = marked.numbers("strain").into_iter().zip(marked.numbers("strain_sd")).zip(&again);
+    let deviations = marked.numbers("strain").into_iter().zip(marked.numbers("strain_sd")).zip(&second_truth);
     let within = deviations.filter(|((strain, sd), truth)| (strain - **truth).abs() <= 1.96 * sd).count();
-    assert!(within * 100 > 90 * again.len(), "{within} of {}", again.len());
+    assert!(within * 100 > 90 * second_truth.len(), "{within} of {}", second_truth.len());
 }
 
 #[test]
@@ -129,8 +131,8 @@ fn what_cannot_be_followed_is_named() {
         (two.replace("strain = 0.1", "angle_deg = 9"), "position `a`: expected `angle_deg` alone"),
         (two.replace("strain", "strian"), "protocol.toml:4: unknown field `strian`"),
     ] {
-        let said = protocol(&text);
-        assert!(said.contains(says), "{said}\n{text}");
+        let message = protocol(&text);
+        assert!(message.contains(says), "{message}\n{text}");
     }
     bench
         .write("protocol.toml", format!("format = 1\njoints = [\"thumb\"]\n{two}{}{}", step("a", 0.0), step("b", 1.0)));
@@ -210,7 +212,7 @@ mod on_a_terminal {
     }
 
     #[test]
-    fn a_spoiled_step_is_made_again_and_nothing_of_it_is_known() {
+    fn a_spoiled_step_is_repeated_and_nothing_of_it_is_known() {
         let bench = short();
         let mut port = Port::plug_in(&bench.path("port"));
         let mut terminal = recorded(&bench);

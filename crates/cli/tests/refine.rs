@@ -154,8 +154,8 @@ fn the_noise_that_was_drawn_is_found_from_a_start_three_times_off() {
     assert_eq!(row(printed, "reading_sd")[2], format!("{:.4e}", found.noise.reading_sd));
 
     // A search from the last result stays at that maximum.
-    let again = ["refine", "drawn.csv", "--sensor", "refined.toml", "-o", "again.toml"];
-    let run = bench.run(&again);
+    let repeat = ["refine", "drawn.csv", "--sensor", "refined.toml", "-o", "again.toml"];
+    let run = bench.run(&repeat);
     let [start, end] = log_likelihoods(done(&run));
     assert!((start - after).abs() < 2e-3 && (end - after).abs() < 2e-3, "{start} {end} {after}");
     let moved = ekf_noise(&read_sensor(&bench, "again.toml")).reading_sd / found.noise.reading_sd;
@@ -224,14 +224,14 @@ fn the_same_input_gives_the_same_output_and_only_readings_count() {
 }
 
 #[test]
-fn many_rows_are_thinned_and_that_is_said() {
+fn many_rows_are_thinned_with_a_message() {
     let bench = Bench::calibrated();
     bench.write("drawn.csv", drawn(3001));
     write_sensor(&bench, linear_law(), TRUE_NOISE, TRUE_MOTION);
     let run = bench.run(&REFINE);
     assert!(done(&run).contains("log-likelihood of 1501 readings: "), "{}", run.stdout);
-    let said = "ohmstrain: drawn.csv: column `resistance_ohm`: 1501 of 3001 rows are used, one in 2\n";
-    assert_eq!(run.stderr, said);
+    let message = "ohmstrain: drawn.csv: column `resistance_ohm`: 1501 of 3001 rows are used, one in 2\n";
+    assert_eq!(run.stderr, message);
 }
 
 #[test]

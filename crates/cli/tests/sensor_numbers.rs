@@ -20,8 +20,8 @@ fn numbers(value: &Value, path: &str, found: &mut Vec<String>) {
             }
         }
         Value::Array(array) => {
-            let told = ["uncertainty", "correction", "findings"].iter().any(|table| path.starts_with(table));
-            for (index, value) in array.iter().enumerate().take(if told { 1 } else { array.len() }) {
+            let is_sampled = ["uncertainty", "correction", "findings"].iter().any(|table| path.starts_with(table));
+            for (index, value) in array.iter().enumerate().take(if is_sampled { 1 } else { array.len() }) {
                 numbers(value, &format!("{path}[{index}]"), found);
             }
         }

@@ -49,10 +49,10 @@ fn a_board_agrees_until_it_runs_something_else() {
     let bench = Bench::calibrated_by_default();
     let Some(printed) = printed(&bench, str::to_owned) else { return };
     bench.write("board.txt", &printed);
-    let said = bench.run(&CHECK).ok();
+    let output = bench.run(&CHECK).ok();
     let steps = printed.matches("step:").count();
-    assert!(steps > 500 && said.starts_with(&format!("{steps} steps, 1 other lines\n")), "{said}");
-    assert!(said.ends_with("\nThe board computes what this computer does.\n"), "{said}");
+    assert!(steps > 500 && output.starts_with(&format!("{steps} steps, 1 other lines\n")), "{output}");
+    assert!(output.ends_with("\nThe board computes what this computer does.\n"), "{output}");
     // Another estimator than the board's, other intervals than its own, and other flags.
     let wrong = |what: &str, args: &[&str], message: &str| {
         let run = bench.run(args);
@@ -86,12 +86,12 @@ fn a_sketch_goes_on_after_a_refused_step() {
     bench.write("board.txt", &printed);
     let (steps, refused) = (printed.matches("step:").count(), printed.matches("ohmstrain_step_after: -4").count());
     assert!(refused > 50 && (steps + 1) / 9 >= refused && steps / 10 < refused, "{steps} {refused}");
-    let said = bench.run(&CHECK).ok();
-    assert!(said.starts_with(&format!("{steps} steps, {} other lines\n", 1 + refused)), "{said}");
+    let output = bench.run(&CHECK).ok();
+    assert!(output.starts_with(&format!("{steps} steps, {} other lines\n", 1 + refused)), "{output}");
 }
 
 #[test]
-fn lines_that_are_lost_or_missing_are_said() {
+fn lost_and_missing_lines_are_reported() {
     let bench = Bench::calibrated();
     let line =
         |step: u32| format!("step:{step},us:200000,ohm:1700.0000,strain:0.01000,lo:0.00000,hi:0.02000,flags:0\n");

@@ -65,7 +65,7 @@ fn a_browser_gets_the_page_and_nothing_else() {
 }
 
 #[test]
-fn what_cannot_be_served_is_said() {
+fn requests_that_cannot_be_served_are_refused() {
     let bench = Bench::new();
     bench.write("page.html", PAGE);
     let served = Served::new(&bench);

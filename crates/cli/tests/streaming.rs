@@ -36,18 +36,19 @@ fn lines_of(child: &mut Child) -> Receiver<String> {
 
 /// Writes row by row, and waits for the answer to each before the next one is written.
 fn converse(trace: &str, stdin: &mut ChildStdin, answers: &Receiver<String>) -> Vec<String> {
-    let mut said = Vec::new();
+    let mut received = Vec::new();
     for line in trace.lines() {
         writeln!(stdin, "{line}").unwrap();
         stdin.flush().unwrap();
         if line.starts_with(|first: char| first.is_ascii_digit()) {
-            if said.is_empty() {
-                said.push(answers.recv_timeout(PATIENCE).expect("the header comes with the first row at the latest"));
+            if received.is_empty() {
+                received
+                    .push(answers.recv_timeout(PATIENCE).expect("the header comes with the first row at the latest"));
             }
-            said.push(answers.recv_timeout(PATIENCE).expect("each row is answered before the next one"));
+            received.push(answers.recv_timeout(PATIENCE).expect("each row is answered before the next one"));
         }
     }
-    said
+    received
 }
 
 fn first_lines(text: &str, count: usize) -> String {
@@ -69,8 +70,8 @@ fn a_live_pipe_is_answered_row_by_row() {
         let mut child = start(&bench, &arguments);
         let answers = lines_of(&mut child);
         let mut stdin = child.stdin.take().unwrap();
-        let said = converse(&trace, &mut stdin, &answers);
-        assert_eq!(said, expected.lines().collect::<Vec<_>>());
+        let received = converse(&trace, &mut stdin, &answers);
+        assert_eq!(received, expected.lines().collect::<Vec<_>>());
         drop(stdin);
         finish(&arguments, child).ok();
         assert!(answers.recv_timeout(PATIENCE).is_err(), "nothing is said after the last row");
@@ -287,8 +288,8 @@ fn bad_lines_are_skipped_where_that_is_wanted_and_counted() {
     let strict = bench.feed(&FILTER, bad.clone());
     assert_eq!(strict.code, Some(4));
     let skipping = bench.feed(&[&FILTER[..], &["--skip-bad"]].concat(), bad);
-    let said = skipping.warnings.concat();
-    assert!(said.contains("4 lines were skipped; the first one: stdin:32: "), "{said}");
+    let warnings = skipping.warnings.concat();
+    assert!(warnings.contains("4 lines were skipped; the first one: stdin:32: "), "{warnings}");
     assert_eq!(skipping.ok(), bench.feed(&FILTER, good).ok());
     let nothing = bench.feed(&[&FILTER[..], &["--skip-bad"]].concat(), "time_s,resistance_ohm\nx,y\n");
     assert_eq!(nothing.code, Some(4));
@@ -333,7 +334,7 @@ fn clock(count: usize) -> String {
 
 /// The clock of a reset board restarts, with its header or without, and so does the filter: at once, and once.
 #[test]
-fn a_clock_that_starts_again_goes_on() {
+fn a_stream_continues_after_a_clock_restart() {
     let bench = Bench::calibrated();
     let skipping = [&FILTER[..], &["--skip-bad"]].concat();
     let header = "time_s,resistance_ohm\n";
@@ -347,10 +348,10 @@ fn a_clock_that_starts_again_goes_on() {
             let stream = format!("{header}{first}{between}{second}");
             let run = bench.feed(&[&skipping[..], lag].concat(), stream.as_str());
             let at = format!("ohmstrain: warning: stdin:{line}: the clock has started again, at ");
-            assert!(run.warnings.iter().any(|said| said.starts_with(&at)), "{:?}", run.warnings);
+            assert!(run.warnings.iter().any(|warning| warning.starts_with(&at)), "{:?}", run.warnings);
             let lines =
                 if skipped == 1 { "1 line was skipped".to_owned() } else { format!("{skipped} lines were skipped") };
-            assert!(run.warnings.iter().any(|said| said.contains(&lines)), "{:?}", run.warnings);
+            assert!(run.warnings.iter().any(|warning| warning.contains(&lines)), "{:?}", run.warnings);
             let estimates = run.ok();
             assert_eq!(Csv::new(&estimates).len(), 100 + rest.lines().count(), "{between:?} {lag:?}");
             if lag.is_empty() {
@@ -368,17 +369,17 @@ fn a_clock_that_starts_again_goes_on() {
 
 /// The restart of a clock is reported while the stream goes on.
 #[test]
-fn a_clock_that_starts_again_is_said_at_once() {
+fn a_clock_restart_is_reported_at_once() {
     let bench = Bench::calibrated();
     let arguments = [&FILTER[..], &["--skip-bad"]].concat();
     let mut child = start(&bench, &arguments);
     let answers = lines_of(&mut child);
-    let mut said = BufReader::new(child.stderr.take().unwrap());
+    let mut stderr = BufReader::new(child.stderr.take().unwrap());
     let mut stdin = child.stdin.take().unwrap();
     write!(stdin, "time_s,resistance_ohm\n{}{}", clock(40), clock(3)).unwrap();
     stdin.flush().unwrap();
     let mut first = String::new();
-    said.read_line(&mut first).unwrap();
+    stderr.read_line(&mut first).unwrap();
     assert!(first.starts_with("ohmstrain: warning: stdin:44: the clock has started again, at 0.4 s"), "{first}");
     let rows: Vec<String> = (0..42).map(|_| answers.recv_timeout(PATIENCE).unwrap()).collect();
     assert!(rows[41].starts_with("0.4,1610,"), "{}", rows[41]);
@@ -399,7 +400,7 @@ fn a_second_clock_has_no_known_strains() {
 }
 
 #[test]
-fn a_recording_whose_clock_starts_again_is_refused_with_a_way_out() {
+fn a_recording_with_a_clock_restart_is_refused_with_a_way_out() {
     let bench = Bench::calibrated();
     bench.write("twice.csv", format!("time_s,resistance_ohm\n{}{}", clock(60), clock(60)));
     let late = "twice.csv:62: column `time_s`: expected a time after 11.8 s, found `0.0`; if the clock has started again there, ";

@@ -56,10 +56,10 @@ fn a_rest_resistance_of_no_such_sensor_is_refused() {
     for factor in [1e-3, 0.2, 5.0, 9.0, 1e3] {
         let given = (factor * rest).to_string();
         for command in [&["filter"][..], &["smooth"], &["evaluate"], &["refine", "-o", "new.toml"]] {
-            let told = [command, &["trace.csv", "--rest-resistance", &given]].concat();
+            let arguments = [command, &["trace.csv", "--rest-resistance", &given]].concat();
             asks(
                 &bench,
-                &told,
+                &arguments,
                 2,
                 "--rest-resistance: resistance at rest: expected ",
                 "in the unit of the calibration's",
@@ -68,8 +68,8 @@ fn a_rest_resistance_of_no_such_sensor_is_refused() {
     }
     // The same holds for R0 from the first readings.
     for command in [&["filter"][..], &["smooth"], &["evaluate"], &["refine", "-o", "new.toml"]] {
-        let told = [command, &["other.csv", "--rest-resistance", "first:5"]].concat();
-        asks(&bench, &told, 4, "other.csv: --rest-resistance first:5: resistance at rest: expected ", "found 14");
+        let arguments = [command, &["other.csv", "--rest-resistance", "first:5"]].concat();
+        asks(&bench, &arguments, 4, "other.csv: --rest-resistance first:5: resistance at rest: expected ", "found 14");
     }
     assert!(!bench.path("new.toml").exists());
     let quarter = (0.26 * rest).to_string();

@@ -163,7 +163,7 @@ impl<E> Substeps<E> {
     }
 
     /// Returns a pause without whole steps, with a length merged by the estimator ([`Estimator::length_s`]).
-    pub fn told_apart<T, const N: usize, const L: usize>(&self, pause: Pause<T>) -> Pause<T>
+    pub fn with_merged_length<T, const N: usize, const L: usize>(&self, pause: Pause<T>) -> Pause<T>
     where
         T: Scalar,
         E: Estimator<T, N, L>,
@@ -178,7 +178,7 @@ impl<E> Substeps<E> {
         T: Scalar,
         E: Estimator<T, N, L>,
     {
-        let pause = self.told_apart(pause);
+        let pause = self.with_merged_length(pause);
         if is_one_step(pause.ahead_s, pause.longest_s) {
             return Repeated { before: pause, count: 0, last: self.0.prepare(pause.ahead_s), last_count: 1 };
         }

@@ -68,7 +68,7 @@ fn written_out(numbers: &Numbers, input: &[f64; D], filtered: Gaussian<f64>) -> 
         sees(p).into_iter().map(|i| ((input[i] - inside[i]) * by(i)).powi(2)).sum()
     };
     let mut unknowns = [0.0; 4];
-    let said = [0, 1, 2, 3].map(|p| {
+    let members = [0, 1, 2, 3].map(|p| {
         let places = sees(p);
         let first = places[0];
         let kernel = |k: usize| {
@@ -92,7 +92,7 @@ fn written_out(numbers: &Numbers, input: &[f64; D], filtered: Gaussian<f64>) -> 
             ((prior * VARIANCES[p]).max(least) * unknown + NOISES[p]) * WIDENINGS[p] + 0.03 * 0.7 * outside(p);
         Gaussian { mean: (base + mean).clamp(-2.0, 2.0), variance }
     });
-    (said, 1.0 - (1.0 - unknowns[1]) * (-outside(1) / 5.0).exp())
+    (members, 1.0 - (1.0 - unknowns[1]) * (-outside(1) / 5.0).exp())
 }
 
 fn blocks<T: Copy>(rows: &[[T; D]; ROWS]) -> Vec<RowBlock<T, D>> {
@@ -160,15 +160,15 @@ fn all_processes_their_mixture_and_novelty() {
     for trial in 0..50 {
         let input: [f64; D] = std::array::from_fn(|i| 3.0 * number(1000 + 10 * trial + i));
         let filtered = Gaussian { mean: input[0], variance: 0.05 * (1.0 + number(9000 + trial)) };
-        let said = correction.correct(&input, filtered, 1.0);
+        let corrected = correction.correct(&input, filtered, 1.0);
         let (members, novelty) = written_out(&numbers, &input, filtered);
         // Tens of sums of products of numbers of order one.
         let close = |a: f64, b: f64| (a - b).abs() < 1e-12 * (1.0 + b.abs());
         let same = |a: Gaussian<f64>, b: Gaussian<f64>| close(a.mean, b.mean) && close(a.variance, b.variance);
-        let [past, future] = said.one_sided;
-        let expected = [said.direct, said.residual, past, future];
-        assert!(members.into_iter().zip(expected).all(|(a, b)| same(b, a)), "{trial}: {said:?}");
-        assert!(close(said.novelty, novelty), "{trial}");
+        let [past, future] = corrected.one_sided;
+        let expected = [corrected.direct, corrected.residual, past, future];
+        assert!(members.into_iter().zip(expected).all(|(a, b)| same(b, a)), "{trial}: {corrected:?}");
+        assert!(close(corrected.novelty, novelty), "{trial}");
         let doubted = [0, 1, 2, 3].map(|p| {
             let others: Vec<Gaussian<f64>> = (0..4).filter(|other| *other != p).map(|other| members[other]).collect();
             let (others, own) = (mixed(&others), members[p]);
@@ -178,7 +178,7 @@ fn all_processes_their_mixture_and_novelty() {
         contradicted += usize::from(doubted != members);
         let Gaussian { mean, variance } = mixed(&doubted);
         let variance = 0.6 * variance + 0.06 * 0.7 * novelty;
-        assert!(close(said.strain.mean, mean) && (said.strain.variance - variance).abs() < 1e-11, "{trial}");
+        assert!(close(corrected.strain.mean, mean) && (corrected.strain.variance - variance).abs() < 1e-11, "{trial}");
     }
     assert!(contradicted > 5, "{contradicted}");
 }
@@ -216,19 +216,25 @@ fn simulated_rows_are_mixed_in_last() {
         let mean = 0.25 + numbers.rows.iter().zip(&weights[1]).map(|(row, weight)| weight * kernel(row)).sum::<f64>();
         let outside: f64 = (6..D).map(|i| ((input[i] - inside[i]) / wider[i].sd).powi(2)).sum();
         let expected = Gaussian { mean: mean.clamp(-2.0, 2.0), variance: 0.08 + 0.03 * 0.7 * outside };
-        let (said, alone) = (with.correct(&input, filtered, 1.0), learned.correct(&input, filtered, 1.0));
+        let (corrected, alone) = (with.correct(&input, filtered, 1.0), learned.correct(&input, filtered, 1.0));
         let close = |a: f64, b: f64| (a - b).abs() < 1e-12 * (1.0 + b.abs());
-        let heard = said.simulated.unwrap();
-        assert!(close(heard.mean, expected.mean) && close(heard.variance, expected.variance), "{trial}: {heard:?}");
-        assert_eq!(said.strain, mixture([alone.strain, heard]), "{trial}");
+        let simulated = corrected.simulated.unwrap();
+        assert!(
+            close(simulated.mean, expected.mean) && close(simulated.variance, expected.variance),
+            "{trial}: {simulated:?}"
+        );
+        assert_eq!(corrected.strain, mixture([alone.strain, simulated]), "{trial}");
         // Innovations four times as large as stated: so is the variance of what has learned from the filter, up to that of a strain
         // anywhere within ±2.
         let Gaussian { mean, variance } = alone.strain;
         let less_sure = Gaussian { mean, variance: (4.0 * variance).min(16.0 / 12.0).max(variance) };
         let surprised = with.correct(&input, filtered, 4.0);
-        let expected = mixture([less_sure, heard]);
+        let expected = mixture([less_sure, simulated]);
         assert!(close(surprised.strain.mean, expected.mean) && close(surprised.strain.variance, expected.variance));
-        assert_eq!((said.direct, said.residual, said.novelty), (alone.direct, alone.residual, alone.novelty));
+        assert_eq!(
+            (corrected.direct, corrected.residual, corrected.novelty),
+            (alone.direct, alone.residual, alone.novelty)
+        );
     }
 }
 
@@ -239,12 +245,16 @@ fn single_precision_says_the_same() {
     correction!(f32, numbers, [], rows_32, scales_32, weights_32, triangles_32, narrow);
     for trial in 0..50 {
         let input: [f64; D] = std::array::from_fn(|i| 3.0 * number(2000 + 10 * trial + i));
-        let said = wide.correct(&input, Gaussian { mean: input[0], variance: 0.05 }, 1.0);
-        let said_32 = narrow.correct(&input.map(|x| x as f32), Gaussian { mean: input[0] as f32, variance: 0.05 }, 1.0);
+        let corrected = wide.correct(&input, Gaussian { mean: input[0], variance: 0.05 }, 1.0);
+        let corrected_32 =
+            narrow.correct(&input.map(|x| x as f32), Gaussian { mean: input[0] as f32, variance: 0.05 }, 1.0);
         // Squared distances reach 30, in which 2⁻²⁴ is 2e-6; a dozen rows add up.
         let close = |a: f32, b: f64| (f64::from(a) - b).abs() < 3e-5 * (1.0 + b.abs());
-        assert!(close(said_32.strain.mean, said.strain.mean), "{trial}: {said:?} {said_32:?}");
-        assert!(close(said_32.strain.variance, said.strain.variance), "{trial}: {said:?} {said_32:?}");
+        assert!(close(corrected_32.strain.mean, corrected.strain.mean), "{trial}: {corrected:?} {corrected_32:?}");
+        assert!(
+            close(corrected_32.strain.variance, corrected.strain.variance),
+            "{trial}: {corrected:?} {corrected_32:?}"
+        );
     }
 }
 
@@ -269,19 +279,22 @@ fn a_mixture_of_any_scale() {
 }
 
 #[test]
-fn a_voice_that_contradicts_all_others_counts_less() {
+fn a_member_that_contradicts_all_others_has_less_weight() {
     let at = |mean: f64, variance: f64| Gaussian { mean, variance };
     // Three at 0 say 0 with a variance of 1: of 100, the square of the distance to the fourth, 98 are left. Two at 0 and the one at 10
     // say 10/3 with a variance of 1 + 200/9, which explains the 100/9 to the third.
-    let said = consensus(at(0.0, 1.0), at(0.0, 1.0), [at(0.0, 1.0), at(10.0, 1.0)]);
+    let result = consensus(at(0.0, 1.0), at(0.0, 1.0), [at(0.0, 1.0), at(10.0, 1.0)]);
     let weight = 99.0_f64.powf(-1.5);
     let mean = 10.0 * weight / (3.0 + weight);
     let second = (3.0 + weight * (99.0 + 100.0)) / (3.0 + weight);
-    assert!((said.mean - mean).abs() < 1e-14 && (said.variance - (second - mean * mean)).abs() < 1e-14, "{said:?}");
+    assert!(
+        (result.mean - mean).abs() < 1e-14 && (result.variance - (second - mean * mean)).abs() < 1e-14,
+        "{result:?}"
+    );
     // Whichever it is.
     for (direct, residual) in [(10.0, 0.0), (0.0, 10.0)] {
-        let again = consensus(at(direct, 1.0), at(residual, 1.0), [at(0.0, 1.0); 2]);
-        assert!((again.mean - mean).abs() < 1e-14, "{again:?}");
+        let permuted = consensus(at(direct, 1.0), at(residual, 1.0), [at(0.0, 1.0); 2]);
+        assert!((permuted.mean - mean).abs() < 1e-14, "{permuted:?}");
     }
     // What their variances explain is no contradiction.
     let near = [at(0.0, 1.0), at(1.0, 2.0), at(0.5, 0.5), at(-0.5, 1.5)];
@@ -375,21 +388,21 @@ fn features_are_bounded() {
 
 /// The error of a start fades as exp(−t/τ) and nothing else changes, since low-passes are linear.
 #[test]
-fn low_passes_start_where_they_are_told_to_and_forget_it() {
+fn low_passes_start_at_their_given_values_and_forget_them() {
     let starts: [[f64; 2]; 6] = std::array::from_fn(|i| [0.1 * i as f64, 0.9 - 0.1 * i as f64]);
     let scale = FeatureScale { centre: 0.1, half_range: 0.5, rates: [0.01, 0.02], starts };
-    let (mut told, mut at_rest) =
+    let (mut started, mut at_rest) =
         (ReadingFeatures::<f64>::new(scale), ReadingFeatures::<f64>::new(FeatureScale { starts: settled(), ..scale }));
     let first = (0.3 - 0.1) / 0.5;
     let off = starts.map(|[a, b]| a + b * first - first);
     let mut time_s = 0.0;
     for (dt_s, reading) in [(0.0, 0.3), (0.4, 0.5), (3.0, 0.2), (20.0, 0.4)] {
         time_s += dt_s;
-        told.step(dt_s, Some(reading));
+        started.step(dt_s, Some(reading));
         at_rest.step(dt_s, Some(reading));
         for (i, tau_s) in ohmstrain_ekf::correction::TIME_CONSTANTS_S.into_iter().enumerate() {
             let expected = at_rest.low_passes()[i] + off[i] * (-time_s / tau_s).exp();
-            assert!((told.low_passes()[i] - expected).abs() < 1e-14, "{time_s} s, τ = {tau_s} s");
+            assert!((started.low_passes()[i] - expected).abs() < 1e-14, "{time_s} s, τ = {tau_s} s");
         }
     }
 }

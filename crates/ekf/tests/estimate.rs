@@ -52,7 +52,7 @@ fn the_border_has_its_probability() {
 }
 
 #[test]
-fn relaxation_and_baseline_are_told_apart() {
+fn relaxation_and_baseline_are_distinguished() {
     let belief = belief([0.1, 0.0, 0.02, 0.03], [0.1; 4]);
     let estimate = Estimate::new(&model([1.9, -1.0, 0.0], [0.6, -0.4]), &belief, &RANGE, 1.0, &SETTLING);
     assert_eq!((estimate.relaxation.mean, estimate.baseline), (0.02, 0.03));
@@ -134,11 +134,11 @@ fn the_ramp_border_is_where_the_reading_stops_changing() {
 }
 
 /// A belief whose rate has been told: regression on it.
-fn knowing_the_rate(belief: &Belief<f64, 4, 10>, told: &Gaussian<f64>) -> Belief<f64, 4, 10> {
+fn knowing_the_rate(belief: &Belief<f64, 4, 10>, known_rate: &Gaussian<f64>) -> Belief<f64, 4, 10> {
     let with_rate: SVector<f64, 4> = SVector::from_fn(|i, _| belief.covariance[(i, 1)]);
-    let variance = with_rate[1] + told.variance;
+    let variance = with_rate[1] + known_rate.variance;
     let mut known = *belief;
-    known.mean += with_rate * ((told.mean - belief.mean[1]) / variance);
+    known.mean += with_rate * ((known_rate.mean - belief.mean[1]) / variance);
     known.covariance.add_outer(&with_rate, -1.0 / variance);
     known
 }
@@ -158,9 +158,9 @@ fn a_smoother_goes_back_through_the_prediction_before_its_cut() {
     let start = belief([0.15, 0.05, 0.02, 0.0], [0.03, 0.06, 0.02, 0.01]);
     let prepared = Estimator::<f64, 4, 10>::prepare(&filter, 0.2);
     let filtered = Mixture::single(start, Phase::Extend);
-    let told = Gaussian { mean: 0.12, variance: 1e-14 };
+    let known_rate = Gaussian { mean: 0.12, variance: 1e-14 };
     let next = filter.advance(&filtered, &prepared, None).unwrap().state;
-    let next = Mixture::single(knowing_the_rate(&next.shares()[0].belief, &told), Phase::Extend);
+    let next = Mixture::single(knowing_the_rate(&next.shares()[0].belief, &known_rate), Phase::Extend);
     let back = filter.smooth_back(&filtered, &prepared, None, &next).unwrap().unwrap().moments();
 
     let step = Dynamics::<f64, 4, 10>::prepare(&model, 0.2);
@@ -169,7 +169,7 @@ fn a_smoother_goes_back_through_the_prediction_before_its_cut() {
     let predicted = toward * prior * toward.transpose() + transition.noise.to_matrix();
     let with_rate = prior * toward.transpose() * vector![0.0, 1.0, 0.0, 0.0];
     let gain = with_rate / predicted[(1, 1)];
-    let mean = start.mean + gain * (told.mean - transition.mean[1]);
+    let mean = start.mean + gain * (known_rate.mean - transition.mean[1]);
     let covariance = prior - gain * with_rate.transpose();
     // The cut half is told its rate through a covariance of 10⁻³ against 10⁻¹⁴; rounding leaves 10⁻¹² of it.
     assert!((back.mean - mean).amax() < 1e-9, "{} {mean}", back.mean);

@@ -193,9 +193,9 @@ fn apart(a: &Belief<f64, 5, 15>, b: &Belief<f64, 5, 15>, prediction: &Belief<f64
 /// A reading that is too exact for single precision is taken again with more noise *from where the step began*: what comes out is
 /// a step in double precision, with the reading as it is or with sixteen times the noise, once or more often.
 #[test]
-fn a_reading_taken_again_is_taken_from_the_same_belief() {
+fn a_repeated_reading_starts_from_the_same_belief() {
     let mut draws = Draws(1);
-    let (mut again, mut most) = (0, 0.0_f64);
+    let (mut repeated, mut most) = (0, 0.0_f64);
     for _ in 0..MODELS {
         let (of_double, dt_s) = random_model::<f64>(&mut Draws(draws.0), QUIET);
         let double = SparseEkf::<f64, Compact, 2, 5>::new(of_double, dt_s).unwrap();
@@ -221,11 +221,11 @@ fn a_reading_taken_again_is_taken_from_the_same_belief() {
             let variance = of_double.noise().reading_sd.powi(2) + f64::from(f32::EPSILON).powi(2);
             let coarser = std::iter::successors(Some(0.0), |noise| Some(16.0 * (noise + variance))).take(13);
             let (tries, least) = coarser.map(apart).enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
-            again += usize::from(tries > 0 && apart(0.0) > ROUNDING);
+            repeated += usize::from(tries > 0 && apart(0.0) > ROUNDING);
             most = most.max(least);
         }
     }
-    assert!(again > 0);
+    assert!(repeated > 0);
     assert!(most < ROUNDING, "{most:e}");
 }
 

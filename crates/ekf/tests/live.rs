@@ -67,9 +67,9 @@ fn a_reading_at_rest_that_cannot_be_this_sensors_is_refused_and_changes_nothing(
         let mut filter = filter();
         filter.step(1700.0).unwrap();
         assert_eq!((filter.rest(measured), filter.rezero(measured)), (Err(error), Err(error)), "{measured}");
-        let mut untold = self::filter();
-        untold.step(1700.0).unwrap();
-        assert_eq!(filter.step(1701.0), untold.step(1701.0), "{measured}");
+        let mut untouched = self::filter();
+        untouched.step(1700.0).unwrap();
+        assert_eq!(filter.step(1701.0), untouched.step(1701.0), "{measured}");
     }
     for measured in [RESTED / farthest, 0.9 * RESTED, RESTED * farthest] {
         let mut filter = filter();

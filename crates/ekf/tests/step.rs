@@ -171,13 +171,13 @@ fn a_long_step_is_many_short_ones() {
         let whole = substeps.advance(&start, &prepared, reading).unwrap().state;
         assert!(same(&whole, &states[count as usize]), "{count}");
         assert!(same(&ekf.step(&start, dt_s, reading).unwrap().posterior, &whole), "{count}");
-        let told = Belief { mean: whole.mean * 1.1, covariance: whole.covariance.scaled(0.5) };
-        let (mut back, mut heard) = (told, reading);
+        let smoothed = Belief { mean: whole.mean * 1.1, covariance: whole.covariance.scaled(0.5) };
+        let (mut back, mut last_reading) = (smoothed, reading);
         for state in states[..count as usize].iter().rev() {
-            back = ekf.smooth_back(state, &short, heard, &back).unwrap().unwrap();
-            heard = None;
+            back = ekf.smooth_back(state, &short, last_reading, &back).unwrap().unwrap();
+            last_reading = None;
         }
-        assert!(same(&substeps.smooth_back(&start, &prepared, reading, &told).unwrap().unwrap(), &back), "{count}");
+        assert!(same(&substeps.smooth_back(&start, &prepared, reading, &smoothed).unwrap().unwrap(), &back), "{count}");
     }
 }
 

@@ -247,8 +247,8 @@ mod tests {
         let cost = |instructions, flash| Cost { instructions, flash, state: 200, stack: 1000 };
         assert_eq!(room.lacks(&cost(160_000, 24_192)), None);
         let lacks = room.lacks(&cost(160_001, 30_000));
-        let said = "160001 instructions where 160000 are free, 30000 B of flash where 24192 are free";
-        assert_eq!(lacks.as_deref(), Some(said));
+        let expected = "160001 instructions where 160000 are free, 30000 B of flash where 24192 are free";
+        assert_eq!(lacks.as_deref(), Some(expected));
     }
 
     #[test]

@@ -108,8 +108,8 @@ impl Run {
                 let normal: f64 = StandardNormal.sample(&mut random);
                 (f64::from(reading) * (1.0 + ROUNDED_BY * normal)) as f32
             };
-            let again = inputs.iter().map(|input| Input { reading: input.reading.map(&mut rounded), ..*input });
-            let (others, _) = single(&again.collect::<Vec<_>>())?;
+            let perturbed = inputs.iter().map(|input| Input { reading: input.reading.map(&mut rounded), ..*input });
+            let (others, _) = single(&perturbed.collect::<Vec<_>>())?;
             let others = others.into_iter().map(|(strain, sd)| (f64::from(strain), f64::from(sd)));
             rounding = rounding.max(farthest(&estimates, others));
         }

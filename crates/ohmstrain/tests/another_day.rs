@@ -144,10 +144,10 @@ fn another_session_is_no_extrapolation() {
     let mut params = sensor.params().clone();
     params.sessions = None;
     let alone = Sensor::from_params(params).unwrap();
-    let said = |sensor: &Sensor| {
+    let warnings = |sensor: &Sensor| {
         let mut watch = ValidityWatch::new(sensor, None);
         let rows = session(sensor, 1.3);
         rows.into_iter().flat_map(|(time_s, reading)| watch.see(time_s, reading, 0.0, f64::NAN)).count()
     };
-    assert_eq!((said(&sensor), said(&alone)), (0, 1));
+    assert_eq!((warnings(&sensor), warnings(&alone)), (0, 1));
 }

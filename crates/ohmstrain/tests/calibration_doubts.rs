@@ -53,7 +53,7 @@ fn each_mistake_is_one_doubt() {
 }
 
 #[test]
-fn a_unit_that_is_said_is_not_asked_about() {
+fn a_stated_unit_is_not_asked_about() {
     let [time_s, ohm, strain] = &bench();
     let (far, small) = (scaled(strain, 20.0), scaled(ohm, 1e-3));
     let balloon = Recording::new(time_s, ohm, &far).unwrap();

@@ -58,11 +58,11 @@ fn a_strain_that_is_known_is_not_doubted() {
     let sensor = sensor();
     let mut known = sensor.filter().initial_strain(0.1).build().unwrap();
     assert_eq!(flagged(&run(&mut known, 0..100, 2000.0), Flag::StartUp), 0);
-    let mut told = sensor.filter().build().unwrap();
-    let before = run(&mut told, 0..20, 2000.0)[19];
-    let after = told.know(0.1, 0.002).unwrap();
+    let mut given = sensor.filter().build().unwrap();
+    let before = run(&mut given, 0..20, 2000.0)[19];
+    let after = given.know(0.1, 0.002).unwrap();
     assert!(before.strain_sd > 10.0 * after.strain_sd);
-    assert_eq!(flagged(&run(&mut told, 20..40, 2000.0), Flag::StartUp), 0);
+    assert_eq!(flagged(&run(&mut given, 20..40, 2000.0), Flag::StartUp), 0);
 }
 
 /// A pause of t seconds is doubted as a start is, by (1 - exp(-t/5 s))² of its deviation, for seconds: written here by one's own
@@ -229,7 +229,7 @@ fn a_still_sensor_repeats_coarse_numbers() {
 /// Calibrated where the rested sensor read 1599.83 ohms. Another day's reads a tenth more: 160 of calibration's 2104 ohms for
 /// 0.33333 of strain. Not told that it rests, it may as well be stretched.
 #[test]
-fn a_rest_that_is_not_calibrations_is_doubted_until_it_is_told() {
+fn a_rest_unlike_calibrations_is_doubted_until_it_is_given() {
     let sensor = sensor();
     let today = 1.1 * 1599.83;
     let run_from = |known: Option<f64>| {

@@ -73,7 +73,7 @@ fn smoothers_say_the_same_whether_empty_rows_are_there() {
 fn a_lost_reading_raises_no_doubt() {
     let sensor = sensor();
     let lost = recording(losses()[0]);
-    let said = |rows: &Rows| -> (f64, Vec<f64>) {
+    let widening = |rows: &Rows| -> (f64, Vec<f64>) {
         let [doubted, stated] =
             [sensor.filter(), sensor.filter().without_doubts()].map(|builder| filtered(builder, rows));
         let read = || (0..rows.len()).filter(|k| lost[*k].1.is_some());
@@ -81,7 +81,7 @@ fn a_lost_reading_raises_no_doubt() {
         let flagged = read().filter(|k| doubted[*k].flags.has(Flag::Recovering)).map(|k| doubted[k].time_s);
         (sd(&doubted) / sd(&stated), flagged.collect())
     };
-    let ((some, some_flagged), (all, all_flagged)) = (said(&lost), said(&recording(|_| false)));
+    let ((some, some_flagged), (all, all_flagged)) = (widening(&lost), widening(&recording(|_| false)));
     assert!((some / all - 1.0).abs() < 1e-3, "{some} for {all}");
     assert_eq!(some_flagged, all_flagged);
 }

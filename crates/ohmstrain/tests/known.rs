@@ -30,54 +30,58 @@ fn smoothed(known: &[Known]) -> Vec<Estimate> {
 const ROWS: [usize; 10] = [200, 300, 400, 500, 600, 700, 800, 900, 1000, 1100];
 
 /// Strains that are 0.06 more than what is said.
-fn offset(said: &[Estimate]) -> [Known; 10] {
-    ROWS.map(|row: usize| Known::new(said[row].time_s - 0.05, said[row].strain + 0.06))
+fn offset(estimates: &[Estimate]) -> [Known; 10] {
+    ROWS.map(|row: usize| Known::new(estimates[row].time_s - 0.05, estimates[row].strain + 0.06))
 }
 
 #[test]
-fn told_before_or_while_it_runs_is_the_same() {
+fn strains_given_before_or_during_a_run_have_the_same_effect() {
     let (sensor, (time_s, ohm)) = (sensor(), recording());
     let known = offset(&filtered(&[]));
     let mut filter = sensor.filter().build().unwrap();
-    let told = time_s.iter().zip(ohm).enumerate().map(|(k, (time_s, ohm))| {
+    let while_running = time_s.iter().zip(ohm).enumerate().map(|(k, (time_s, ohm))| {
         let row = filter.step(*time_s, ohm).unwrap();
         let known = known.iter().zip(ROWS).find(|(_, row)| *row == k);
         known.map_or(row, |(known, _)| filter.know(known.strain, 0.005 * sensor.params().limits.span()).unwrap())
     });
     let strain = |row: Estimate| (row.strain, row.strain_sd);
-    let told: Vec<_> = told.map(strain).collect();
+    let while_running: Vec<_> = while_running.map(strain).collect();
     let before: Vec<_> = filtered(&known).into_iter().map(strain).collect();
-    assert_eq!(told, before);
+    assert_eq!(while_running, before);
 }
 
 /// Rows before the first known strain are as they were; what is known at a row is what is said there, and an offset that shows ten
 /// times is there at the end.
 #[test]
 fn an_offset_lasts() {
-    let said = filtered(&[]);
-    let known = offset(&said);
-    let told = filtered(&known);
-    assert_eq!(told[..200], said[..200]);
-    let more = |row: usize| told[row].strain - said[row].strain;
+    let without_known = filtered(&[]);
+    let known = offset(&without_known);
+    let with_known = filtered(&known);
+    assert_eq!(with_known[..200], without_known[..200]);
+    let more = |row: usize| with_known[row].strain - without_known[row].strain;
     assert!((more(200) - 0.06).abs() < 0.003 && more(1199) > 0.03, "{} {}", more(200), more(1199));
     // No filter but the strain knows of it.
-    assert_eq!(told[700].relaxation, said[700].relaxation);
+    assert_eq!(with_known[700].relaxation, without_known[700].relaxation);
 }
 
 #[test]
-fn a_smoother_is_told_of_both_sides() {
-    let said = smoothed(&[]);
-    let known = offset(&said);
-    let told = smoothed(&known);
+fn a_known_strain_changes_both_sides_of_a_smoother() {
+    let without_known = smoothed(&[]);
+    let known = offset(&without_known);
+    let with_known = smoothed(&known);
     for row in [0, 350, 650, 1199] {
-        assert!(told[row].strain - said[row].strain > 0.02, "{row}: {}", told[row].strain - said[row].strain);
+        assert!(
+            with_known[row].strain - without_known[row].strain > 0.02,
+            "{row}: {}",
+            with_known[row].strain - without_known[row].strain
+        );
     }
-    assert!(known.iter().zip(ROWS).all(|(known, row)| (told[row].strain - known.strain).abs() < 0.002));
+    assert!(known.iter().zip(ROWS).all(|(known, row)| (with_known[row].strain - known.strain).abs() < 0.002));
     // In any order; what comes after the last row is of no use.
     let mut others = known.to_vec();
     others.reverse();
     others.insert(3, Known::new(500.0, 0.0));
-    assert_eq!(smoothed(&others), told);
+    assert_eq!(smoothed(&others), with_known);
     // One row is told before any other: it is the first one.
     let first = smoothed(&[Known::new(-7.0, 0.1)]);
     assert!((first[0].strain - 0.1).abs() < 0.005, "{}", first[0].strain);
@@ -96,7 +100,7 @@ fn what_cannot_be_known_is_refused() {
 
 /// A known strain also changes the rows that wait for a lag.
 #[test]
-fn rows_that_wait_are_told() {
+fn a_known_strain_changes_rows_that_wait() {
     let (sensor, (time_s, ohm)) = (sensor(), recording());
     let lagged = |known: &[Known]| {
         let mut filter = sensor.filter().known(known).build_lagged(2.0).unwrap();
@@ -107,9 +111,9 @@ fn rows_that_wait_are_told() {
         rows.extend_from_slice(filter.finish().unwrap());
         rows
     };
-    let said = lagged(&[]);
-    let told = lagged(&[Known::new(60.0, said[600].strain + 0.02)]);
-    assert_eq!(told[..580], said[..580]);
-    let more = |row: usize| told[row].strain - said[row].strain;
+    let without_known = lagged(&[]);
+    let with_known = lagged(&[Known::new(60.0, without_known[600].strain + 0.02)]);
+    assert_eq!(with_known[..580], without_known[..580]);
+    let more = |row: usize| with_known[row].strain - without_known[row].strain;
     assert!(more(600) > 0.015 && more(590) > 0.003, "{} {}", more(600), more(590));
 }

@@ -26,7 +26,7 @@ fn a_reference_that_explains_nothing_is_looked_for_elsewhere() {
 
 /// Further away than lags are looked for, 12 s, but by less than a movement: the end of the search explains the readings best.
 #[test]
-fn a_lag_at_the_end_of_the_search_is_said() {
+fn a_lag_at_the_end_of_the_search_is_reported() {
     let time_s: Vec<f64> = (0..1500).map(|k| 0.1 * f64::from(k)).collect();
     let ohm: Vec<f64> = time_s.iter().map(|t| 1500.0 * (1.0 + 1.8 * strain_at(*t) - strain_at(*t).powi(2))).collect();
     for (lag_s, end_s) in [(12.4, 12.0), (-12.4, -12.0)] {

@@ -26,7 +26,7 @@ fn rows(file: &Path) -> Vec<Vec<f64>> {
 const TOLERANCE: f64 = 1e-6;
 
 #[test]
-fn a_released_sensor_says_what_it_said() {
+fn a_released_sensor_reproduces_its_estimates() {
     assert!(released().len() >= 2);
     for folder in released() {
         let sensor = Sensor::from_toml(&fs::read_to_string(folder.join("sensor.toml")).unwrap()).unwrap();
@@ -35,9 +35,9 @@ fn a_released_sensor_says_what_it_said() {
         let mut filter = sensor.filter().build().unwrap();
         let filtered: Vec<Estimate> = readings.iter().map(|row| filter.step(row[0], row[1]).unwrap()).collect();
         let smoothed = sensor.smooth(&time_s, &ohm).unwrap();
-        for (said, file) in [(&filtered, "filter.csv"), (&smoothed, "smooth.csv")] {
+        for (estimates, file) in [(&filtered, "filter.csv"), (&smoothed, "smooth.csv")] {
             for row in rows(&folder.join(file)) {
-                let estimate = &said[time_s.iter().position(|time_s| *time_s == row[0]).unwrap()];
+                let estimate = &estimates[time_s.iter().position(|time_s| *time_s == row[0]).unwrap()];
                 let (apart, wider) = (estimate.strain - row[1], estimate.strain_sd - row[2]);
                 assert!(apart.abs() < TOLERANCE && wider.abs() < TOLERANCE, "{folder:?} {row:?}: {apart} {wider}");
             }

@@ -159,7 +159,7 @@ def descendants(pid):
     return [pid, *(found for child in below for found in descendants(int(child)))]
 
 
-def kill_later(what, output, after_files, said):
+def kill_later(what, output, after_files, remarks):
     """Kills a worker with all that it started, without a warning, when so many files of the output have been begun."""
     shutil.rmtree(output, ignore_errors=True)
 
@@ -177,7 +177,7 @@ def kill_later(what, output, after_files, said):
                 os.kill(pid, signal.SIGKILL)
             except ProcessLookupError:
                 pass
-        said.append(f"killed {len(pids)} processes when {begun} files of the output were begun")
+        remarks.append(f"killed {len(pids)} processes when {begun} files of the output were begun")
 
     threading.Thread(target=kill, daemon=True).start()
 
@@ -226,9 +226,9 @@ class PeakMemory(threading.Thread):
 
 
 def run(folder, engine, task, estimator, workers, partitions, master, kill, after_files, columns):
-    said = []
+    remarks = []
     if kill:
-        kill_later(kill, folder / f"estimates-{engine}", after_files, said)
+        kill_later(kill, folder / f"estimates-{engine}", after_files, remarks)
     peak = PeakMemory()
     if engine == "plain":
         clock = plain(folder, task, estimator, workers, columns)
@@ -236,16 +236,16 @@ def run(folder, engine, task, estimator, workers, partitions, master, kill, afte
         clock = spark(folder, task, estimator, workers, partitions, master)
     else:
         clock = ray(folder, task, estimator, workers, partitions)
-    assert said or not kill, "it was over before a worker was killed"
+    assert remarks or not kill, "it was over before a worker was killed"
     rows = ds.dataset(folder / "recordings").count_rows()
     seconds = clock.elapsed_s
     found = f"{engine} {task} ({estimator}, workers: {workers}): {rows} rows in {seconds:.1f} s, {rows / seconds:.0f} rows/s"
     if clock.processor_s:
-        said.insert(0, f"{clock.processor_s / rows * 1e6:.2f} us of processor time a row")
+        remarks.insert(0, f"{clock.processor_s / rows * 1e6:.2f} us of processor time a row")
     if engine != "plain":
         largest = ", ".join(f"{name} {kb / 1024:.0f}" for name, kb in sorted(peak.peak_kb.items()))
-        said.insert(0, f"MB in the largest workers: {largest}")
-    print("; ".join([found, *said]), flush=True)
+        remarks.insert(0, f"MB in the largest workers: {largest}")
+    print("; ".join([found, *remarks]), flush=True)
 
 
 def check(folder, engine):

@@ -26,8 +26,8 @@ def main(sensor_file, port, out):
                 except ValueError as error:  # No numbers, or a datagram that has overtaken another.
                     print(f"{line!r}: {error}", file=sys.stderr)
                     continue
-                said = f"{row['time_s']!r},{row['strain']!r},{row['strain_sd']!r}\n"
-                udp.sendto(said.encode(), (host, int(out_port)))
+                answer = f"{row['time_s']!r},{row['strain']!r},{row['strain_sd']!r}\n"
+                udp.sendto(answer.encode(), (host, int(out_port)))
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ use pyo3_arrow::PyTable;
 
 use crate::about::About;
 use crate::doubts::{called, on_one_clock, raised_or_warned};
-use crate::error::{Place, Stopped, heed, of_library, raise};
+use crate::error::{Place, Stopped, check_signals, of_library, raise};
 use crate::evaluation::{Scored, after_split};
 use crate::options::estimator;
 use crate::recording::Recording;
@@ -138,7 +138,7 @@ fn run(
     });
     warnings.extend(left_out);
     let interrupted = |error: PyErr| resume_unwind(Box::new(error));
-    let calibrated = calibration.run_with(&known, |_| heed().unwrap_or_else(interrupted))?;
+    let calibrated = calibration.run_with(&known, |_| check_signals().unwrap_or_else(interrupted))?;
     warnings.extend(raised_or_warned(recordings, &calibrated.doubts()).map_err(Stopped::Interrupted)?);
     Ok((calibrated, warnings))
 }

@@ -58,7 +58,7 @@ impl From<Error> for Stopped {
 }
 
 /// Returns the exception of a signal that has arrived.
-pub fn heed() -> PyResult<()> {
+pub fn check_signals() -> PyResult<()> {
     Python::attach(|py| py.check_signals())
 }
 

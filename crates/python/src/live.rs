@@ -79,13 +79,13 @@ impl LiveFilter {
         filter: ohmstrain::Filter,
         sensor: ohmstrain::Sensor,
         columns: Vec<Column>,
-        told: Option<f64>,
+        given: Option<f64>,
         known: Vec<Known>,
         stored: Stored,
     ) -> Self {
-        let rest_resistance = told.or(stored.rest_resistance);
+        let rest_resistance = given.or(stored.rest_resistance);
         let (mut watch, zero_ns) = (Watch::new(&sensor, rest_resistance, &known), stored.zero_ns);
-        if told.is_none() {
+        if given.is_none() {
             watch.go_on(stored);
         }
         Self { zero_ns, ..Self::watched(filter, watch, sensor, columns, rest_resistance, known) }

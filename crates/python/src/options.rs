@@ -38,8 +38,8 @@ impl Options {
             }
             Some(Rest::Named(name)) if name == "calibrated" => Ok(Some(sensor.params().rested())),
             Some(Rest::Named(name)) => {
-                let said = format!("rest_resistance: expected a positive number or calibrated, found `{name}`");
-                Err(raise(&Place::default(), &said))
+                let message = format!("rest_resistance: expected a positive number or calibrated, found `{name}`");
+                Err(raise(&Place::default(), &message))
             }
         }
     }
@@ -51,8 +51,8 @@ impl Options {
         let column = |name: &String| {
             known.iter().copied().find(|column| column.name() == name).ok_or_else(|| {
                 let names: Vec<&str> = known.iter().map(Column::name).collect();
-                let said = format!("columns: expected some of {}, found `{name}`", names.join(","));
-                raise(&Place::default(), &said)
+                let message = format!("columns: expected some of {}, found `{name}`", names.join(","));
+                raise(&Place::default(), &message)
             })
         };
         chosen.iter().map(column).collect()

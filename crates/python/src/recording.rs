@@ -14,7 +14,7 @@ use pyo3::prelude::*;
 use pyo3_arrow::PyTable;
 
 use crate::about::About;
-use crate::error::{Place, Stopped, heed, of_library, raise};
+use crate::error::{Place, Stopped, check_signals, of_library, raise};
 
 /// A recording in the form that the library takes. Missing values are NaN.
 #[derive(Debug)]
@@ -40,7 +40,7 @@ pub struct Recording {
 }
 
 /// Number of rows between checks for an interrupt.
-const HEEDED: usize = 4096;
+const ROWS_PER_CHECK: usize = 4096;
 
 /// Groups of columns: a table has exactly one of each of the first two groups, and at most one of the third.
 const TIMES: [&str; 2] = ["time_s", "time_us"];
@@ -139,8 +139,8 @@ impl Recording {
     /// Filters the rows in turn, and passes each estimate to `take`; an interrupt stops it.
     pub fn filtered(&self, filter: &mut Filter, mut take: impl FnMut(usize, &Estimate)) -> PyResult<()> {
         for row in 0..self.time_s.len() {
-            if row % HEEDED == HEEDED - 1 {
-                heed()?;
+            if row % ROWS_PER_CHECK == ROWS_PER_CHECK - 1 {
+                check_signals()?;
             }
             let (time_s, reading) = self.row(row);
             let estimate = filter.step(time_s, reading).map_err(|error| match error {
@@ -159,7 +159,7 @@ impl Recording {
             |row| self.row(row),
             |rows, segment| {
                 take(rows, segment);
-                heed().map_err(Stopped::Interrupted)
+                check_signals().map_err(Stopped::Interrupted)
             },
         );
         done.map_err(|stopped| match stopped {

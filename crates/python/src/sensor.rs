@@ -109,8 +109,8 @@ impl Sensor {
     fn resume(&self, options: Options, state: &str, file: Option<&str>) -> PyResult<LiveFilter> {
         let stored = stored(state, file)?;
         let filter = options.builder(&self.sensor)?.resume(&stored).map_err(|error| of_library(&error, file))?;
-        let (columns, told) = (options.columns(&self.sensor)?, options.rest_resistance(&self.sensor)?);
-        Ok(LiveFilter::resumed(filter, self.sensor.clone(), columns, told, options.known.clone(), stored))
+        let (columns, given) = (options.columns(&self.sensor)?, options.rest_resistance(&self.sensor)?);
+        Ok(LiveFilter::resumed(filter, self.sensor.clone(), columns, given, options.known.clone(), stored))
     }
 
     /// Resumes a filter with a lag.

@@ -108,14 +108,14 @@ def test_lab_streaming_layer(folder, rows, expected):
         inlet = pylsl.StreamInlet(found[0])
         inlet.open_stream(timeout=PATIENCE)
         assert outlet.wait_for_consumers(PATIENCE)
-        begin, said = pylsl.local_clock(), []
+        begin, samples = pylsl.local_clock(), []
         for time_ns, ohm in rows:
             outlet.push_sample([ohm], begin + time_ns / 1e9)
-            said.append(inlet.pull_sample(timeout=PATIENCE))
+            samples.append(inlet.pull_sample(timeout=PATIENCE))
     # The stamps pass through a clock's correction and a smoothing: microseconds, on one machine.
-    strains = np.array([sample for sample, _ in said])
+    strains = np.array([sample for sample, _ in samples])
     np.testing.assert_allclose(strains, expected, rtol=1e-2, atol=1e-4)
-    np.testing.assert_allclose([stamp - begin for _, stamp in said], [time_ns / 1e9 for time_ns, _ in rows], atol=1e-3)
+    np.testing.assert_allclose([stamp - begin for _, stamp in samples], [time_ns / 1e9 for time_ns, _ in rows], atol=1e-3)
 
 
 def write_ros2(path, rows, plugin="MCAP"):
@@ -206,7 +206,7 @@ def test_ros2_topic_without_ros(folder, rows):
     assert len(found) >= 10 and all(-0.1 < value < 0.5 for value in found), found
 
 
-def test_ros2_node_is_said_not_to_be_run():
+def test_ros2_node_is_reported_as_not_run():
     text = (EXAMPLES / "ros2_node.py").read_text(encoding="utf-8")
     compile(text, "ros2_node.py", "exec")
     assert "Not run by this project's tests" in ast.get_docstring(ast.parse(text))
@@ -221,8 +221,8 @@ def test_foxglove(folder, rows, expected):
             channel = None
             while channel is None:
                 message = socket_.recv(timeout=PATIENCE)
-                said = json.loads(message) if isinstance(message, str) else {}
-                channel = next((c for c in said.get("channels", ()) if c["topic"] == "/strain"), None)
+                parsed = json.loads(message) if isinstance(message, str) else {}
+                channel = next((c for c in parsed.get("channels", ()) if c["topic"] == "/strain"), None)
             assert channel["encoding"] == "json" and "lower" in channel["schema"]
             socket_.send(json.dumps({"op": "subscribe", "subscriptions": [{"id": 1, "channelId": channel["id"]}]}))
             found = []

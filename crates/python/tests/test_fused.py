@@ -46,7 +46,7 @@ def test_rows_are_those_of_hand(knee):
     assert live.step(100.0, [None, math.nan, None])["faulty"] is None
 
 
-def test_what_is_wrong_is_said(knee):
+def test_errors_are_reported(knee):
     with pytest.raises(oh.OhmstrainError, match="expected 3 channels, those of the fusion, found 1"):
         oh.FusedSensor.load([knee / "knee-inner.toml"], knee / "knee-fusion.toml")
     (knee / "worse.toml").write_text((knee / "knee-fusion.toml").read_text().replace("novelty = ", "novelty = -"))

@@ -86,11 +86,11 @@ def test_pieces_are_the_whole(trace, sensor):
 def test_doubts_stand_in_a_column(trace, sensor):
     readings = trace["resistance_ohm"] * np.where(trace.index < 200, 1.0, 3.0)
     rows = trace.head(250)[["time_s"]].assign(resistance_ohm=readings, sensor_id="left", recording_id=1)
-    with pytest.warns(oh.OhmstrainWarning) as said:
+    with pytest.warns(oh.OhmstrainWarning) as warned:
         sensor.filter(rows)
     table = pa.Table.from_pandas(rows, preserve_index=False)
     found = Work("filter", BY, sensor)(table)["warnings"]
-    assert found[0].as_py() == "; ".join(str(one.message) for one in said) and found.null_count == 249
+    assert found[0].as_py() == "; ".join(str(one.message) for one in warned) and found.null_count == 249
     pieces = list(Work("filter", BY, sensor).stream(iter(table.to_batches(max_chunksize=64))))
     assert "".join(text for piece in pieces for text in piece["warnings"].drop_null().to_pylist()) == found[0].as_py()
     with pytest.warns(oh.OhmstrainWarning):

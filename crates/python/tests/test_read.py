@@ -44,10 +44,10 @@ def test_units_that_a_file_says_are_not_asked_about(folder, trace, tmp_path):
     (tmp_path / "said.csv").write_text("# strain_unit = percent\n# resistance_unit = kohm\n" + rows)
     with pytest.raises(oh.OhmstrainError, match="bare.csv: .*strain_unit"):
         oh.calibrate(oh.read(tmp_path / "bare.csv"), **QUICK)
-    said = oh.read(tmp_path / "bare.csv", strain_unit="percent", resistance_unit="kohm")
-    assert said.drop_columns(["time_s"]).equals(oh.read(tmp_path / "said.csv").drop_columns(["time_s"]))
-    np.testing.assert_allclose(said["strain"].to_numpy(), trace["strain"], atol=1e-12)
-    assert oh.calibrate(said, **QUICK) == oh.calibrate(oh.read(tmp_path / "said.csv"), **QUICK)
+    given = oh.read(tmp_path / "bare.csv", strain_unit="percent", resistance_unit="kohm")
+    assert given.drop_columns(["time_s"]).equals(oh.read(tmp_path / "said.csv").drop_columns(["time_s"]))
+    np.testing.assert_allclose(given["strain"].to_numpy(), trace["strain"], atol=1e-12)
+    assert oh.calibrate(given, **QUICK) == oh.calibrate(oh.read(tmp_path / "said.csv"), **QUICK)
 
 
 def lab(trace, path, header="t (ms),R (kOhm),strain (%)"):

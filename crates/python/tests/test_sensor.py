@@ -20,14 +20,14 @@ def test_save_load_pickle(tmp_path, folder, sensor):
     assert "copy.toml" in repr(sensor) and sensor.estimator == "sign-split" and sensor.quantity == "strain"
 
 
-def test_a_loaded_sensor_says_what_it_said(tmp_path, trace):
+def test_a_loaded_sensor_prints_the_same(tmp_path, trace):
     made = oh.calibrate(trace, estimator="ekf", branches=1)
-    said, findings = repr(made).partition("Sensor ")[0], made.findings
+    printed, findings = repr(made).partition("Sensor ")[0], made.findings
     made.save(tmp_path / "sensor.toml")
     for kept in (oh.Sensor.load(tmp_path / "sensor.toml"), pickle.loads(pickle.dumps(made)), made):
         assert kept == made and kept.findings == findings and findings["seen"]["rows"] == len(trace)
         # Its file's name is all that is new.
-        assert re.split("Sensor |Written ", repr(kept))[0] == said and "Record next" in said
+        assert re.split("Sensor |Written ", repr(kept))[0] == printed and "Record next" in printed
     matplotlib = pytest.importorskip("matplotlib")
     matplotlib.use("Agg")
     figures = [sensor.plot.calibration() for sensor in (made, oh.Sensor.load(tmp_path / "sensor.toml"))]
@@ -75,9 +75,9 @@ def test_wrong_options_are_named(sensor):
 @pytest.mark.filterwarnings("ignore::ohmstrain.OhmstrainWarning")
 def test_warns_beyond_the_calibration(trace, sensor):
     beyond = trace.assign(resistance_ohm=trace["resistance_ohm"] * 3)
-    with pytest.warns(oh.OhmstrainWarning, match="outside of the calibration") as said:
+    with pytest.warns(oh.OhmstrainWarning, match="outside of the calibration") as warned:
         sensor.filter(beyond)
-    assert all(one.filename == __file__ for one in said)
+    assert all(one.filename == __file__ for one in warned)
 
 
 def test_the_interpreter_is_free_meanwhile(trace, sensor):
@@ -104,7 +104,7 @@ def test_the_interpreter_is_free_meanwhile(trace, sensor):
 
 
 @pytest.mark.filterwarnings("ignore::ohmstrain.OhmstrainWarning")
-def test_an_interrupt_is_heeded(trace, sensor):
+def test_an_interrupt_stops_the_run(trace, sensor):
     """What a signal's handler raises comes out of the work that it meets."""
     rows = 40_000
     readings, strain = (np.resize(trace[name].to_numpy(), rows) for name in ("resistance_ohm", "strain"))

@@ -89,7 +89,7 @@ def test_pieces_of_dates_go_on(sensor, rows):
     pd.testing.assert_frame_equal(pd.concat([first, second]), whole)
 
 
-def test_r0_that_was_told_is_kept(sensor, rows):
+def test_a_given_r0_is_kept(sensor, rows):
     live = sensor.filter(rest_resistance=1650.0, initial_strain=0.0)
     steps(live, rows[:20])
     live.rest_resistance(1620.0)
@@ -97,7 +97,7 @@ def test_r0_that_was_told_is_kept(sensor, rows):
     assert steps(other, rows[20:]) == steps(live, rows[20:])
 
 
-def test_warnings_are_not_said_twice(sensor, trace):
+def test_warnings_are_not_repeated(sensor, trace):
     far = trace[["time_s", "resistance_ohm"]].assign(resistance_ohm=2 * trace["resistance_ohm"])
     live = sensor.filter()
     with pytest.warns(oh.OhmstrainWarning, match="outside"):
@@ -111,12 +111,12 @@ def test_a_state_that_does_not_belong_here(sensor, rows, tmp_path):
     live = sensor.filter()
     steps(live, rows[:5])
     live.save(tmp_path / "state.toml")
-    for options, said in [
+    for options, message in [
         ({"gate": 10.8}, "state.toml: the state belongs to a filter with gate none, this one has 10.8; give the same options"),
         ({"lag_s": 0.5}, "lag none, this one has 0.5 s"),
         ({"initial_strain": 0.0}, "initial strain: the first row is over"),
     ]:
-        with pytest.raises(oh.OhmstrainError, match=said):
+        with pytest.raises(oh.OhmstrainError, match=message):
             sensor.filter(resume=tmp_path / "state.toml", **options)
     text = re.sub(r"(strain_sd_scale = )([\d.]+)", lambda found: found[1] + repr(1.01 * float(found[2])), sensor.to_toml(), count=1)
     with pytest.raises(oh.OhmstrainError, match="state.toml: the state belongs to another sensor"):

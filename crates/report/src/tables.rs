@@ -104,8 +104,8 @@ impl ParameterRows<'_> {
     fn fitted(&mut self, name: &str, path: &str, value: f64, unit: &str) {
         let place = self.uncertainty.and_then(|known| known.names.iter().position(|name| name == path));
         self.found.extend(place);
-        let told = self.uncertainty.map_or_else(|| "–".into(), |known| told(known, place));
-        self.rows.push([name.into(), plain(value), told, unit.into()]);
+        let estimate = self.uncertainty.map_or_else(|| "–".into(), |known| estimate_text(known, place));
+        self.rows.push([name.into(), plain(value), estimate, unit.into()]);
     }
 
     /// Adds the errors of parameters without a row of their own.
@@ -121,7 +121,7 @@ impl ParameterRows<'_> {
 }
 
 /// Formats the estimate of a parameter from the recordings; one whose interval contains zero is not determined.
-fn told(known: &Uncertainty, place: Option<usize>) -> String {
+fn estimate_text(known: &Uncertainty, place: Option<usize>) -> String {
     let at = |values: &[f64]| place.and_then(|place| values.get(place).copied());
     match (at(&known.values), at(&known.standard_errors)) {
         (Some(value), Some(error)) if value.abs() > Z_95 * error => with_error(value, error),

@@ -155,7 +155,7 @@ fn names_are_escaped() {
 }
 
 #[test]
-fn parameters_are_what_the_recordings_tell_or_not_told() {
+fn parameters_are_estimated_from_the_recordings_or_marked_undetermined() {
     let mut sensor = sensor();
     let names = ["gauge.coefficients[0]", "extend_viscosity_s"].map(String::from).to_vec();
     let (values, standard_errors) = (vec![1.8, 0.01], vec![0.1, 0.02]);
@@ -193,7 +193,7 @@ fn anything_gives_a_report() {
 }
 
 #[test]
-fn what_is_not_there_is_said() {
+fn missing_parts_are_reported() {
     let time: Vec<f64> = (0..200).map(|k| 0.1 * f64::from(k)).collect();
     let strain: Vec<f64> = time.iter().map(|t| 0.1 + 0.1 * t.sin()).collect();
     let outputs: Vec<Estimate> = strain.iter().map(|x| row(*x, None)).collect();

@@ -10,7 +10,7 @@ use ohmstrain_calib::{Samples, screen};
 use serde::Deserialize;
 use wasm_bindgen::prelude::*;
 
-use crate::doubts::{heed, on_one_clock};
+use crate::doubts::{on_one_clock, refuse_or_warn};
 use crate::json::{json, refused};
 use crate::recording::Recording;
 use crate::sensor::Sensor;
@@ -164,16 +164,16 @@ fn of_recordings(
         _ => format!("{}: {error}", names.join(", ")),
     };
     let as_read = known_recordings(recordings, &samples).map_err(text)?;
-    heed(recordings, &motion_doubts(&as_read), warnings)?;
+    refuse_or_warn(recordings, &motion_doubts(&as_read), warnings)?;
     let screened = screen(&samples).map_err(|error| named(&error))?;
     let known = known_recordings(recordings, &screened.samples()).map_err(text)?;
-    heed(recordings, &calibration_doubts(&known), warnings)?;
+    refuse_or_warn(recordings, &calibration_doubts(&known), warnings)?;
     warnings.extend(first_distrusted_rows(&screened.distrusted, recordings));
     let calibrated = calibration.run_with(&known, |stage| tell(progress, stage)).map_err(|error| match &error {
         ohmstrain::Error::Calibration(error) => named(error),
         other => other.to_string(),
     })?;
-    heed(recordings, &calibrated.doubts(), warnings)?;
+    refuse_or_warn(recordings, &calibrated.doubts(), warnings)?;
     Ok(calibrated)
 }
 

@@ -5,7 +5,11 @@ use ohmstrain::trace::{TraceFile, doubt_text};
 use ohmstrain::{CalibrationDoubt, Interface, LagAnswer};
 
 /// Adds the warnings about a calibration; the first doubt that needs an answer is an error.
-pub fn heed(recordings: &[TraceFile], doubts: &[CalibrationDoubt], warnings: &mut Vec<String>) -> Result<(), String> {
+pub fn refuse_or_warn(
+    recordings: &[TraceFile],
+    doubts: &[CalibrationDoubt],
+    warnings: &mut Vec<String>,
+) -> Result<(), String> {
     for doubt in doubts {
         let text = doubt_text(doubt, recordings);
         if doubt.is_refusal() {

@@ -4,10 +4,10 @@ use ohmstrain_bench_data::Trace;
 use ohmstrain_bench_data::import::{LARGEST_FILE, Table, read_table};
 use wasm_bindgen::prelude::*;
 
+use crate::answers;
 use crate::inspection::{Inspection, Proposal, proposed};
 use crate::json::refused;
 use crate::recording::Recording;
-use crate::said;
 
 /// Files of one recording, as a lab wrote them: text, XLSX, Parquet, each optionally in gzip.
 #[wasm_bindgen]
@@ -35,10 +35,10 @@ impl Files {
         Ok(())
     }
 
-    /// Inspects the files: their contents, and the recording or the question that follows. `said` are flags of
+    /// Inspects the files: their contents, and the recording or the question that follows. `answers` are flags of
     /// `ohmstrain import` in the syntax of a shell.
-    pub fn inspect(&self, said: &str) -> Result<Inspection, JsError> {
-        let recipe = said::recipe(said).map_err(refused)?;
+    pub fn inspect(&self, answers: &str) -> Result<Inspection, JsError> {
+        let recipe = answers::recipe(answers).map_err(refused)?;
         for (name, bytes) in &self.files {
             refuse_results(name, bytes).map_err(refused)?;
         }
@@ -47,7 +47,7 @@ impl Files {
         };
         let tables: Vec<Table> = self.files.iter().enumerate().map(table).collect::<Result<_, _>>().map_err(refused)?;
         let found = proposed(&tables, &recipe).and_then(|(plan, imported)| {
-            let as_is = if said.is_empty() { self.as_is(&imported.trace) } else { None };
+            let as_is = if answers.is_empty() { self.as_is(&imported.trace) } else { None };
             let is_trace = as_is.is_some();
             let recording = match as_is {
                 Some(recording) => recording,

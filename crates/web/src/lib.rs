@@ -7,6 +7,7 @@
 //! - No access to files or servers. Bytes come in, bytes and numbers go out.
 //! - A panic ends the instance; its text is kept for [`last_panic`].
 
+mod answers;
 mod calibration;
 mod doubts;
 mod estimates;
@@ -18,7 +19,6 @@ mod json;
 mod live;
 mod recording;
 mod report;
-mod said;
 mod sensor;
 mod stream;
 mod stream_lines;

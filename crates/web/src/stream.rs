@@ -234,8 +234,8 @@ impl Stream {
     }
 
     /// Returns the summary: counts, columns, the last message.
-    #[wasm_bindgen(unchecked_return_type = "StreamSaid")]
-    pub fn said(&self) -> Result<JsValue, JsError> {
+    #[wasm_bindgen(unchecked_return_type = "StreamSummary")]
+    pub fn summary(&self) -> Result<JsValue, JsError> {
         let mut metadata = self.lines.parser.metadata();
         metadata.other.retain(|(key, _)| key != "made_by");
         let metadata = format!("# made_by = {MADE_BY} live\n{metadata}");

@@ -61,7 +61,7 @@ export interface Cost {
 }
 
 /** What there is to say of the lines of a board. */
-export interface StreamSaid {
+export interface StreamSummary {
   counts: { rows: number; missing: number; badLines: number; restarts: number };
   message: string;
   /** Columns that were found; none before a header. */

@@ -75,7 +75,7 @@ pub struct Hypotheses<const N: usize> {
 
 /// Comparison of a reading with its prediction.
 #[derive(Clone, Copy, Debug)]
-pub struct Said {
+pub struct Comparison {
     /// Innovation, and its variance.
     pub innovation: (f64, f64),
     /// Log density of the reading.
@@ -203,7 +203,7 @@ impl<const N: usize> Children<N> {
         self.kept[lightest] = child;
     }
 
-    fn finish(mut self) -> (Vec<Hypothesis<N>>, Option<Said>) {
+    fn finish(mut self) -> (Vec<Hypothesis<N>>, Option<Comparison>) {
         let heaviest = self.kept.iter().fold(f64::NEG_INFINITY, |most, one| most.max(one.log_weight));
         self.kept.retain(|one| one.log_weight > heaviest - 12.0);
         let total: f64 = self.kept.iter().map(|one| one.log_weight.exp()).sum();
@@ -215,8 +215,8 @@ impl<const N: usize> Children<N> {
         let mean = sum(&|child| child.0 * child.1) / weight;
         let variance = sum(&|child| child.0 * (child.2 + (child.1 - mean).powi(2))) / weight;
         let log_density = (sum(&|child| child.0 * child.3.exp()) / weight).ln();
-        let said = Said { innovation: (mean, variance), log_density };
-        (self.kept, (weight > 0.0).then_some(said))
+        let comparison = Comparison { innovation: (mean, variance), log_density };
+        (self.kept, (weight > 0.0).then_some(comparison))
     }
 }
 
@@ -227,7 +227,7 @@ impl<const B: usize, const N: usize> Naive<B, N> {
         from: &Hypotheses<N>,
         dt_s: f64,
         reading: Option<Reading<f64>>,
-    ) -> (Hypotheses<N>, Option<Said>) {
+    ) -> (Hypotheses<N>, Option<Comparison>) {
         let pause_s = if reading.is_some() { 0.0 } else { from.pause_s + dt_s };
         let forgets_s =
             if self.model.motion().phase_rate() == 0.0 { 0.75 * self.model.longest_step_s() } else { f64::INFINITY };
@@ -241,8 +241,8 @@ impl<const B: usize, const N: usize> Naive<B, N> {
                 }
             }
         }
-        let (all, said) = children.finish();
-        (Hypotheses { all, pause_s, open }, said)
+        let (all, comparison) = children.finish();
+        (Hypotheses { all, pause_s, open }, comparison)
     }
 
     fn follows(&self, phase: Phase, dt_s: f64, open: bool) -> [f64; 3] {

@@ -97,7 +97,7 @@ mod tests {
     /// Second differences of white noise with standard deviation 0.3 on a steep line. The squares of neighbours are correlated, so the
     /// median of n = 20 000 is known to a few percent.
     #[test]
-    fn noise_is_told_from_a_steady_change() {
+    fn noise_is_distinguished_from_a_steady_change() {
         let mut state = 1_u64;
         let mut uniform = || {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

@@ -7,7 +7,7 @@ use super::search::Search;
 
 /// Threshold on a singular value, as a fraction of the largest, below which the data do not determine its direction: the square root of the
 /// rounding error. Below it the variance itself is rounding.
-const TOLD: f64 = 1.5e-8;
+const LEAST_SINGULAR: f64 = 1.5e-8;
 /// Component of a parameter along an undetermined direction above which it has no standard error.
 const INVOLVED: f64 = 1e-3;
 
@@ -150,7 +150,7 @@ impl Inverse {
             for b in 0..kept.len() {
                 let mut sum = 0.0;
                 for (i, value) in singular.iter().enumerate() {
-                    if *value > TOLD * largest {
+                    if *value > LEAST_SINGULAR * largest {
                         sum += right[(i, a)] * right[(i, b)] / (value * value);
                     } else if right[(i, a)].abs().max(right[(i, b)].abs()) > INVOLVED {
                         sum = f64::NAN;

@@ -168,7 +168,7 @@ mod tests {
     fn few_rows_stand_for_all_and_state_their_error() {
         let (real, known) = rows(100, 7);
         let time_s: Vec<f64> = (0..100).map(f64::from).collect();
-        let said_of = |known: &[f64]| {
+        let distilled_from = |known: &[f64]| {
             let examples = Examples {
                 inputs: &real,
                 strain: known,
@@ -197,7 +197,7 @@ mod tests {
             let of = prepared.simulated(&distilled).unwrap();
             (of, distilled.sd, prepared.scales)
         };
-        let (of, sd, scales): (_, _, [InputScale<f64>; D]) = said_of(&known);
+        let (of, sd, scales): (_, _, [InputScale<f64>; D]) = distilled_from(&known);
         // The strain has a standard deviation of 0.5; sixty-four rows cover seven dimensions, most of them irrelevant.
         assert!(sd < 0.05, "{sd}");
         let (others, strain) = rows(500, 900_000);
@@ -214,7 +214,7 @@ mod tests {
         let left = (others.iter().zip(&strain).map(error).sum::<f64>() / 500.0).sqrt();
         assert!(left < 1.5 * of.sd && of.sd < 0.1, "{left} {}", of.sd);
         let off: Vec<f64> = known.iter().enumerate().map(|(k, x)| if k < 20 { x + 0.5 } else { *x }).collect();
-        let (of, sd, _) = said_of(&off);
+        let (of, sd, _) = distilled_from(&off);
         // Errors of 0.015 in twenty rows: 0.003 is one standard deviation of the cross term.
         assert!((of.sd * of.sd - sd * sd - 0.25).abs() < 0.01, "{}", of.sd);
     }

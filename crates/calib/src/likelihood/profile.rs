@@ -14,7 +14,7 @@ const TOLERANCE: f64 = 1e-6;
 const LONGEST: f64 = 2.0;
 /// Least cosine between the unexplained change of the gradient and the step for a rank-one update of the Hessian; a smaller one is
 /// rounding.
-const TEACHES: f64 = 1e-8;
+const LEAST_COSINE: f64 = 1e-8;
 
 /// A 95 % interval from the profile likelihood: the values at which the other parameters can make the readings sufficiently likely. It
 /// follows the likelihood where that is not a parabola, and does not include zero.
@@ -146,7 +146,7 @@ impl<'a, F: ModelFamily<N, L>, const N: usize, const L: usize> Walk<'a, F, N, L>
     fn learn(&mut self, step: &DVector<f64>, slopes: &DVector<f64>) {
         let unexplained = slopes - &self.gradient - &self.hessian * step;
         let along = unexplained.dot(step);
-        if along.abs() > TEACHES * unexplained.norm() * step.norm() {
+        if along.abs() > LEAST_COSINE * unexplained.norm() * step.norm() {
             self.hessian += &unexplained * unexplained.transpose() / along;
         }
     }

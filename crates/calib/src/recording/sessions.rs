@@ -34,7 +34,7 @@ mod tests {
     use crate::samples::Samples;
 
     #[test]
-    fn sessions_are_told_by_recordings_that_begin_at_rest() {
+    fn sessions_are_recognised_by_recordings_that_begin_at_rest() {
         let time_s = [0.0, 1.0, 2.0];
         let (at_rest, stretched) = ([0.0, 0.1, 0.3], [0.1, 0.2, 0.3]);
         let readings = [[1000.0, 1500.0, 2000.0], [1500.0, 2000.0, 3000.0]];

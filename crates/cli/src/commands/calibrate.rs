@@ -172,17 +172,17 @@ pub fn calibrate_recordings(
     check_alike(recordings)?;
     let names: Vec<&str> = recordings.iter().map(|recording| recording.name.as_str()).collect();
     let as_read = known_recordings(recordings, &samples)?;
-    plausible::heed(recordings, &motion_doubts(&as_read), progress.messages())?;
+    plausible::refuse_or_warn(recordings, &motion_doubts(&as_read), progress.messages())?;
     let screened = screen(&samples).map_err(|error| CliError::calibration(&names, &error))?;
     let samples = screened.samples();
     let known = known_recordings(recordings, &samples)?;
-    plausible::heed(recordings, &calibration_doubts(&known), progress.messages())?;
+    plausible::refuse_or_warn(recordings, &calibration_doubts(&known), progress.messages())?;
     plausible::warn_of_distrusted(recordings, &screened.distrusted, progress.messages());
     let calibrated =
         calibration.run_with(&known, |stage| progress.calibrating(stage)).map_err(|error| match error {
             Error::Calibration(error) => CliError::calibration(&names, &error),
             other => other.into(),
         })?;
-    plausible::heed(recordings, &calibrated.doubts(), progress.messages())?;
+    plausible::refuse_or_warn(recordings, &calibrated.doubts(), progress.messages())?;
     Ok(calibrated)
 }

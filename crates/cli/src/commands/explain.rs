@@ -9,7 +9,7 @@ use crate::args::CalibrateArgs;
 use crate::error::CliError;
 use crate::output;
 
-const NOT_TOLD: &str =
+const NOT_IDENTIFIED: &str =
     "parameters without the ridge: not told; without it the equations of the law are singular on these recordings\n";
 
 /// Returns the text that `calibrate --explain` and `--bootstrap` print.
@@ -27,7 +27,7 @@ pub fn text(args: &CalibrateArgs, recordings: &[TraceFile], law: &LawParams) -> 
         let found = match identifiability(&samples, law) {
             Ok(found) => found.to_string(),
             // A law that is determined by its ridge penalty alone is a valid answer.
-            Err(CalibrationError::Singular) => NOT_TOLD.to_owned(),
+            Err(CalibrationError::Singular) => NOT_IDENTIFIED.to_owned(),
             Err(error) => return Err(failed(error)),
         };
         let structures = structures(&compare_structures(&samples).map_err(failed)?);

@@ -236,13 +236,13 @@ impl<'a, W: io::Write + Send> Stream<'a, W> {
     fn begin(&mut self, known: &'a [Known]) -> Result<(), CliError> {
         let sink = &mut self.sink;
         sink.rest.map_or(Ok(()), |measured| self.filter.rest_resistance(measured))?;
-        let told = sink.rest.is_some();
+        let is_given = sink.rest.is_some();
         let stored = self.stored.take();
         // A resumed filter has its R₀ already.
         sink.rest = sink.rest.or(stored.as_ref().and_then(|stored| stored.rest_resistance));
         sink.watch = ValidityWatch::new(&sink.sensor, sink.rest);
         sink.quiet = QuietWatch::new(&sink.sensor, sink.rest, known);
-        if let Some(stored) = stored.filter(|_| !told) {
+        if let Some(stored) = stored.filter(|_| !is_given) {
             stored.validity.into_iter().for_each(|seen| sink.watch.go_on(seen));
             stored.quiet.into_iter().for_each(|seen| sink.quiet.go_on(seen));
         }

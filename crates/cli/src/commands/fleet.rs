@@ -26,13 +26,13 @@ fn fit(args: &FleetFitArgs, messages: &Messages) -> Result<(), CliError> {
     outputs.put(output, prior.to_toml()?.into_bytes());
     outputs.publish()?;
     if !messages.is_quiet() {
-        print(|out| Ok(writeln!(out, "{}", told(&prior, &args.output))?))?;
+        print(|out| Ok(writeln!(out, "{}", summary(&prior, &args.output))?))?;
     }
     Ok(())
 }
 
 /// Summarises the prior in a few words.
-fn told(prior: &Prior, output: &Path) -> String {
+fn summary(prior: &Prior, output: &Path) -> String {
     let params = prior.params();
     let branches = params.law.tau_s.iter().map(|tau_s| format!("{tau_s:.1}")).collect::<Vec<_>>().join(", ");
     let correction = params.correction.as_ref().map_or_else(

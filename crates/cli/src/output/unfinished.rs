@@ -117,7 +117,7 @@ fn hold(lock: &File, path: &Path) -> bool {
 
 /// Prepares the first output in a folder: removes the remains of processes that have ended.
 fn prepare(folder: &Path) {
-    heed_signals();
+    handle_signals();
     if begun().iter().any(|path| folder_of(path) == folder) {
         return;
     }
@@ -140,15 +140,15 @@ fn prepare(folder: &Path) {
 
 /// Removes the unfinished outputs when a signal ends the process, and then lets the signal take its usual effect.
 #[cfg(unix)]
-fn heed_signals() {
+fn handle_signals() {
     use std::sync::Once;
 
     use signal_hook::consts::{SIGINT, SIGTERM};
     use signal_hook::iterator::Signals;
     use signal_hook::low_level::emulate_default_handler;
 
-    static HEEDED: Once = Once::new();
-    HEEDED.call_once(|| {
+    static INSTALLED: Once = Once::new();
+    INSTALLED.call_once(|| {
         let ignored = ignored_signals();
         let wanted = [SIGINT, SIGTERM].into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0);
         let Ok(mut signals) = Signals::new(wanted) else { return };
@@ -165,7 +165,7 @@ fn heed_signals() {
 }
 
 #[cfg(not(unix))]
-const fn heed_signals() {}
+const fn handle_signals() {}
 
 /// Returns the signals that the parent process has set to be ignored, one bit each, if the system lists them.
 #[cfg(unix)]

@@ -85,7 +85,7 @@ impl<T> Feed<T> {
                 taker.take(due)?;
             }
             match self.source.events.try_recv() {
-                Ok(event) => self.heed(event, taker)?,
+                Ok(event) => self.handle(event, taker)?,
                 Err(TryRecvError::Empty | TryRecvError::Disconnected) => return Ok(()),
             }
         }
@@ -107,12 +107,12 @@ impl<T> Feed<T> {
             return Ok(());
         }
         match self.source.events.recv_timeout(longest) {
-            Ok(event) => self.heed(event, taker),
+            Ok(event) => self.handle(event, taker),
             Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => Ok(()),
         }
     }
 
-    fn heed(&mut self, event: Event, taker: &mut impl Taker<Row = T>) -> Result<(), CliError> {
+    fn handle(&mut self, event: Event, taker: &mut impl Taker<Row = T>) -> Result<(), CliError> {
         match event {
             Event::Line(line, arrived) => self.held = taker.parse(&line, arrived)?,
             Event::Connected => self.status = "connected".into(),

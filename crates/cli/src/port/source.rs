@@ -106,7 +106,7 @@ pub(super) fn read_to_end(source: &mut dyn Read, send: &SyncSender<Event>) -> Re
     send.send(Event::Connected)?;
     let failed = loop {
         match lines.read(source, send) {
-            Err(Stop::Unheard) => return Ok(()),
+            Err(Stop::NoReceiver) => return Ok(()),
             Err(Stop::Failed(error)) => break Some(error),
             Ok(0) => break None,
             Ok(_) => {}
@@ -142,7 +142,7 @@ fn read_port(path: &Path, baud: u32, send: &SyncSender<Event>) {
                 let _ = send.send(Event::Connected);
                 loop {
                     match lines.read(&mut port, send) {
-                        Err(Stop::Unheard) => return,
+                        Err(Stop::NoReceiver) => return,
                         Err(Stop::Failed(error)) => break error.to_string(),
                         Ok(0) => break "it was unplugged".into(),
                         Ok(_) => {}
@@ -160,14 +160,14 @@ fn read_port(path: &Path, baud: u32, send: &SyncSender<Event>) {
 /// Reason why reading stopped.
 pub(super) enum Stop {
     /// The receiver is gone.
-    Unheard,
+    NoReceiver,
     /// The source failed.
     Failed(io::Error),
 }
 
 impl From<SendError<Event>> for Stop {
     fn from(_: SendError<Event>) -> Self {
-        Self::Unheard
+        Self::NoReceiver
     }
 }
 

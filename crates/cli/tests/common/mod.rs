@@ -125,9 +125,9 @@ pub struct Run {
 impl Run {
     /// Collects the results of a process.
     pub fn new(arguments: &[&str], output: Output) -> Self {
-        let said = String::from_utf8(output.stderr).unwrap();
+        let printed = String::from_utf8(output.stderr).unwrap();
         let is_warning = |line: &&str| line.starts_with("ohmstrain: warning: ");
-        let (warnings, stderr): (Vec<&str>, Vec<&str>) = said.split_inclusive('\n').partition(is_warning);
+        let (warnings, stderr): (Vec<&str>, Vec<&str>) = printed.split_inclusive('\n').partition(is_warning);
         Self {
             command: arguments.join(" "),
             code: output.status.code(),

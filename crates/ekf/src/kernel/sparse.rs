@@ -110,7 +110,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         reading: Option<Reading<T>>,
     ) -> Result<Option<Residual<T>>, StepError> {
         match self.step_once(belief, reading) {
-            Err(refused) => self.step_again(belief, reading, refused, Self::step_once),
+            Err(refused) => self.retry_step(belief, reading, refused, Self::step_once),
             taken => taken,
         }
     }
@@ -131,7 +131,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         gate: T,
     ) -> Result<Residual<T>, StepError> {
         match self.gated_once(belief, reading, gate) {
-            Err(refused) => self.gated_again(belief, reading, gate, refused),
+            Err(refused) => self.retry_gated(belief, reading, gate, refused),
             taken => taken,
         }
     }
@@ -171,7 +171,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
 
     #[cold]
     #[inline(never)]
-    fn gated_again<const L: usize>(
+    fn retry_gated<const L: usize>(
         &self,
         belief: &mut Belief<T, N, L>,
         reading: Reading<T>,
@@ -181,13 +181,13 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         let gated = |_: &Self, belief: &mut Belief<T, N, L>, reading: Option<Reading<T>>| {
             reading.map(|reading| self.gated_once(belief, reading, gate)).transpose()
         };
-        self.step_again(belief, Some(reading), refused, gated)?.ok_or(refused)
+        self.retry_step(belief, Some(reading), refused, gated)?.ok_or(refused)
     }
 
     /// Repeats a `refused` step with increasing noise of the reading.
     #[cold]
     #[inline(never)]
-    fn step_again<const L: usize>(
+    fn retry_step<const L: usize>(
         &self,
         belief: &mut Belief<T, N, L>,
         mut reading: Option<Reading<T>>,

@@ -429,7 +429,7 @@ mod tests {
     }
 
     /// Returns the variance and flags after rows every 0.1 s of readings with normalised innovations squared.
-    fn said(parts: DoubtParts<f64>, rows: impl IntoIterator<Item = (f64, f64)>) -> (f64, Flags) {
+    fn widened_after(parts: DoubtParts<f64>, rows: impl IntoIterator<Item = (f64, f64)>) -> (f64, Flags) {
         let mut doubts = Doubts::new(parts).of_known_strain(false);
         rows.into_iter().for_each(|row| {
             doubts.see(0.1, Some(row), STATED);
@@ -442,7 +442,7 @@ mod tests {
         // After 200 s the mean has settled to exp(-10).
         for (nis, times) in [(0.5, 1.0), (1.0, 1.0), (4.0, 4.0), (1e6, 30.0)] {
             // No jump: all readings are equal.
-            let (variance, flags) = said(parts(1.0), vec![(0.5, nis); 2000]);
+            let (variance, flags) = widened_after(parts(1.0), vec![(0.5, nis); 2000]);
             assert!((variance / STATED.variance / times - 1.0).abs() < 1e-3, "{nis}: {variance}");
             assert_eq!(flags.has(Flag::Extrapolated), times > 1.0);
         }
@@ -458,7 +458,7 @@ mod tests {
         assert!(flags.has(Flag::Extrapolated));
         // One outlier among readings that fit: capped at 30, for a two-hundredth of the time.
         let outlier = |k: usize| (0.5, if k == 1990 { 1e6 } else { 0.5 });
-        let (variance, flags) = said(parts(1.0), (0..2000).map(outlier));
+        let (variance, flags) = widened_after(parts(1.0), (0..2000).map(outlier));
         assert!((variance - stated).abs() < 1e-12 && flags == Flags::NONE, "{variance} {flags}");
     }
 
@@ -475,7 +475,7 @@ mod tests {
                 rest: parts(1.0).rest.map(|rest| RestSeen { tolerance: 0.1, ..rest }),
                 ..parts(1.0)
             };
-            let (variance, flags) = said(parts, rows);
+            let (variance, flags) = widened_after(parts, rows);
             assert!(flags.has(Flag::Extrapolated));
             // Rows 0.1 s apart are pauses of 0.1 s.
             variance - STATED.variance - 1e-4 * (1.0 - (-0.1_f64 / 5.0).exp()).powi(4)
@@ -494,7 +494,7 @@ mod tests {
         let far = (1.5 * 0.12 * 0.3 * (-10.0_f64 / 60.0).exp()).powi(2);
         for (sign, above, below) in [(1.0, far, near), (-1.0, near, far), (0.0, far, far)] {
             for (reading, expected) in [(1.14, above), (-0.14, below), (1.02, 0.0)] {
-                let (variance, flags) = said(parts(sign), after(reading));
+                let (variance, flags) = widened_after(parts(sign), after(reading));
                 assert!(
                     (variance - STATED.variance - expected).abs() < 1e-9,
                     "{sign} {reading}: {variance} {expected}"
@@ -503,6 +503,6 @@ mod tests {
             }
         }
         // At most the variance of a strain anywhere in the limits.
-        assert!((said(parts(1.0), after(9.0)).0 - STATED.variance - 0.0075).abs() < 1e-12);
+        assert!((widened_after(parts(1.0), after(9.0)).0 - STATED.variance - 0.0075).abs() < 1e-12);
     }
 }

@@ -416,7 +416,7 @@ where
 
     /// Prepares the steps of a pause, unless they are already prepared.
     fn prepare(&mut self, pause: Pause<T>) {
-        let pause = self.estimator.told_apart(pause);
+        let pause = self.estimator.with_merged_length(pause);
         if pause != self.prepared.0 {
             self.prepared = (pause, self.estimator.prepare_over(pause));
         }

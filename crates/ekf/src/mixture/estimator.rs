@@ -150,7 +150,7 @@ macro_rules! mixture_steps {
         ) -> Result<Option<MixtureResidual<T>>, StepError> {
             match self.step_once(state, reading) {
                 Err(refused) => {
-                    self.step_again(state, reading, refused, |state, reading| self.step_once(state, reading))
+                    self.retry_step(state, reading, refused, |state, reading| self.step_once(state, reading))
                 }
                 taken => taken,
             }
@@ -182,7 +182,7 @@ macro_rules! mixture_steps {
 
         #[cold]
         #[inline(never)]
-        fn step_again<const L: usize, H: StepReading<T>>(
+        fn retry_step<const L: usize, H: StepReading<T>>(
             &self,
             state: &mut Mixture<T, N, L, K>,
             mut reading: H,
@@ -192,7 +192,7 @@ macro_rules! mixture_steps {
             let (mut from, mut tries) = (*state, 0);
             loop {
                 tries += 1;
-                reading = reading.again(&self.kernel, tries, refused)?;
+                reading = reading.for_retry(&self.kernel, tries, refused)?;
                 loosen(from.shares_mut(), tries);
                 match once(&mut from, reading) {
                     Err(error) => refused = error,
@@ -218,7 +218,7 @@ macro_rules! mixture_steps {
             match self.step_to(state, reading, next) {
                 Err(refused) => {
                     *next = *state;
-                    self.step_again(next, reading, refused, |state, reading| {
+                    self.retry_step(next, reading, refused, |state, reading| {
                         let mut next = Mixture::empty();
                         let residual = self.step_to(state, reading, &mut next)?;
                         *state = next;
@@ -243,7 +243,7 @@ macro_rules! mixture_steps {
                     Ok(_) => break following,
                     Err(refused) => {
                         tries += 1;
-                        reading = reading.again(&self.kernel, tries, refused)?;
+                        reading = reading.for_retry(&self.kernel, tries, refused)?;
                         loosen(smoothed.shares_mut(), tries);
                     }
                 }

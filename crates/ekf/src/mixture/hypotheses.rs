@@ -10,10 +10,10 @@ use ohmstrain_model::{Phase, SwitchedModel, Turning};
 
 use crate::Real;
 use crate::kernel::{Course, Parts, Several};
-use crate::mixture::again::{StepReading, loosen};
 use crate::mixture::estimator::{mixture_filter, mixture_steps, over_phases};
 use crate::mixture::evidence::{PredictedChildren, UpdatedChildren, Weighing};
 use crate::mixture::lineage::{Following, Recorder};
+use crate::mixture::retry::{StepReading, loosen};
 use crate::mixture::spawn::{ChildTrace, MixtureStep, Parents, Spawns};
 use crate::mixture::state::Mixture;
 use crate::mixture::switching::fresh_rate;

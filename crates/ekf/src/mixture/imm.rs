@@ -12,10 +12,10 @@ use ohmstrain_model::{Phase, SwitchedModel};
 use crate::Real;
 use crate::kernel::{Course, Parts};
 use crate::mixture::LEAST_WEIGHT;
-use crate::mixture::again::{StepReading, loosen};
 use crate::mixture::estimator::{mixture_filter, over_phases};
 use crate::mixture::evidence::{Weighing, Weight};
 use crate::mixture::predicted::Predicted;
+use crate::mixture::retry::{StepReading, loosen};
 use crate::mixture::state::{PhaseMixture, Share};
 use crate::mixture::switching::fresh_rate;
 use crate::{
@@ -68,7 +68,7 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, 
                 Err(refused) => {
                     tries += 1;
                     let before = before.get_or_insert(*state);
-                    reading = self.again(state, reading, tries, refused).inspect_err(|_| *state = *before)?;
+                    reading = self.prepare_retry(state, reading, tries, refused).inspect_err(|_| *state = *before)?;
                 }
                 taken => return taken,
             }
@@ -78,14 +78,14 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, 
     /// Returns the reading for another try of a refused step, and loosens the correlations of its initial state.
     #[cold]
     #[inline(never)]
-    fn again<const L: usize>(
+    fn prepare_retry<const L: usize>(
         &self,
         state: &mut PhaseMixture<T, N, L>,
         reading: Option<Reading<T>>,
         tries: u32,
         refused: StepError,
     ) -> Result<Option<Reading<T>>, StepError> {
-        let reading = reading.again(&self.kernel, tries, refused)?;
+        let reading = reading.for_retry(&self.kernel, tries, refused)?;
         loosen(&mut state.modes, tries);
         Ok(reading)
     }

@@ -1,4 +1,3 @@
-mod again;
 mod children;
 mod estimator;
 pub(crate) mod evidence;
@@ -10,6 +9,7 @@ mod mixing;
 pub(crate) mod pair;
 mod pause;
 mod predicted;
+mod retry;
 pub(crate) mod sign_split;
 pub(crate) mod spawn;
 mod state;

@@ -10,11 +10,11 @@ use ohmstrain_model::{Phase, SwitchedModel, Turning};
 
 use crate::Real;
 use crate::kernel::{Course, Parts, Several, side_of};
-use crate::mixture::again::{StepReading, loosen};
 use crate::mixture::estimator::{mixture_filter, mixture_steps};
 use crate::mixture::evidence::{PredictedChildren, UpdatedChildren, Weighing};
 use crate::mixture::lineage::{Following, Recorder};
 use crate::mixture::pause::Pause;
+use crate::mixture::retry::{StepReading, loosen};
 use crate::mixture::spawn::{ChildTrace, MixtureStep, Parents, Spawns};
 use crate::mixture::state::Mixture;
 use crate::mixture::switching::{forgets_direction_s, fresh_rate, longest_cut_s};

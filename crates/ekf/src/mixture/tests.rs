@@ -276,7 +276,7 @@ struct Listener;
 impl super::lineage::Recorder<f64, 2> for Listener {}
 
 /// A body that moves to and fro with rests, near both limits; some readings are missing or outliers.
-fn heard(k: usize) -> Option<Reading<f64>> {
+fn reading_at(k: usize) -> Option<Reading<f64>> {
     let t = k as f64;
     let slow = 0.22 + 0.24 * (t * 0.01).sin().clamp(-0.8, 0.8);
     let wild = if k % 97 == 5 { 0.4 } else { 0.0 };
@@ -290,7 +290,7 @@ fn in_vectors_and_one_by_one<F: Spawns<f64, 2, 5>>(filter: &F, start: &Belief<f6
     for k in 0..3000 {
         let step = |next, listens: bool| {
             let step =
-                MixtureStep { filter, state: &state, reading: heard(k), next, open: false, branches: PhantomData };
+                MixtureStep { filter, state: &state, reading: reading_at(k), next, open: false, branches: PhantomData };
             if listens { step.done(&mut Listener) } else { step.done(&mut ()) }
         };
         assert_eq!(step(&mut together, false), step(&mut alone, true), "row {k}");
@@ -346,14 +346,14 @@ fn what_is_followed_too_has_its_share_and_the_others_keep_theirs() {
         add(&mut children, &(weight, belief(strain)), Phase::Extend);
     }
     let other = Mixture::single(belief(0.5), Phase::Hold);
-    let said = |mixture: &Mixture<f64, 3, 6, 2>| -> Vec<(f64, f64, Phase)> {
+    let components = |mixture: &Mixture<f64, 3, 6, 2>| -> Vec<(f64, f64, Phase)> {
         let phases = mixture.phases().iter();
         mixture.shares().iter().zip(phases).map(|(share, phase)| (share.belief.mean[0], share.weight, *phase)).collect()
     };
     // No place is free: the lighter one is dropped.
-    assert_eq!(said(&mixture.beside(&other, 0.25)), [(0.5, 0.25, Phase::Hold), (0.9, 0.75, Phase::Extend)]);
+    assert_eq!(components(&mixture.beside(&other, 0.25)), [(0.5, 0.25, Phase::Hold), (0.9, 0.75, Phase::Extend)]);
     let alone = Mixture::<f64, 3, 6, 2>::single(belief(0.1), Phase::Extend);
-    assert_eq!(said(&alone.beside(&other, 0.25)), [(0.1, 0.75, Phase::Extend), (0.5, 0.25, Phase::Hold)]);
+    assert_eq!(components(&alone.beside(&other, 0.25)), [(0.1, 0.75, Phase::Extend), (0.5, 0.25, Phase::Hold)]);
     // One Gaussian has no room.
     assert_eq!(belief(0.1).beside(&belief(0.5), 0.25), belief(0.1));
 }

@@ -180,8 +180,8 @@ fn what_is_written_down_of_pairs_and_limits_is_what_hypotheses_do() {
         let other = &states[(k + 1 + 7 * (k % 2)) % states.len()];
         let (parts, others): (Parts<f32, 2>, Parts<f32, 2>) = (Parts::of(state), Parts::of(other));
         let mut more: Vec<f32> = other.mean.iter().chain(other.covariance.packed()).copied().collect();
-        let said = About::of(&parts).is_like(&About::of(&others));
-        compare(&filter, Piece::Alike, state, &more, &[truth(said)]);
+        let is_alike = About::of(&parts).is_like(&About::of(&others));
+        compare(&filter, Piece::Alike, state, &more, &[truth(is_alike)]);
         let distance = About::of(&parts).distance(&About::of(&others));
         compare(&filter, Piece::Distance, state, &more, &[distance]);
         let mut pair = *state;
@@ -194,7 +194,7 @@ fn what_is_written_down_of_pairs_and_limits_is_what_hypotheses_do() {
         let strain = (parts.strain, parts.strain_variance);
         let expected = weighing.of_limits::<_, Compact>(strain, 1.5, true);
         compare(&filter, Piece::OfLimits, state, &[1.5, limits.lower, limits.upper], &expected);
-        alike += usize::from(said);
+        alike += usize::from(is_alike);
         near += usize::from(expected[1] != 1.0);
     }
     assert!(alike > 2 && alike < 75 && near > 5 && near < 75, "{alike} {near}");

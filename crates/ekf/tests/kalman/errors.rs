@@ -54,7 +54,7 @@ fn an_exact_reading_leaves_no_variance() {
 }
 
 #[test]
-fn no_maximum_is_said_to_be_none() {
+fn a_missing_maximum_is_reported() {
     let start = maximise([0.0], |_| Err::<f64, _>(KalmanError::NonFiniteState));
     assert_eq!(start, Err(NoMaximum::Start));
     let rising = maximise([0.0], |theta| Ok::<_, KalmanError>(theta[0]));

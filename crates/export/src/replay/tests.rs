@@ -100,7 +100,7 @@ fn library(filter: &mut Filter, rows: &[RecordedRow]) -> Vec<(f64, f64)> {
 
 /// Compares a twin that rested on another day, with another R₀, with the filter that is given that R₀ and starts at zero.
 #[test]
-fn a_twin_that_starts_again_at_zero_is_the_librarys_filter_that_starts_there() {
+fn a_twin_restarted_at_zero_equals_the_librarys_filter_started_there() {
     let (sensor, another_day) = (sensor(), 1.08);
     let params = sensor.params();
     let rested = another_day * params.measured_rest.unwrap();

@@ -155,7 +155,7 @@ mod tests {
 
     /// Tests that a sensor that is not better is recognised by its errors, whatever the sentence.
     #[test]
-    fn what_is_not_better_is_told_by_its_errors() {
+    fn a_sensor_that_is_not_better_is_recognised_by_its_errors() {
         let part = |error: f64| Known::new(&scores(error, 0.1), Some(&scores(0.1, 1.0)));
         assert_eq!(is_better(&[part(0.08)]), Some(true));
         for known in [vec![part(0.095)], vec![part(0.2)], vec![part(0.03), part(0.2)]] {

@@ -106,7 +106,7 @@ def read(
     """
     if not paths:
         raise TypeError("expected at least one path")
-    said = {
+    arguments = {
         "preset": preset,
         "columns": [(role, "none" if column is None else str(column)) for role, column in (columns or {}).items()],
         "units": [(role, str(unit)) for role, unit in (units or {}).items()],
@@ -130,7 +130,7 @@ def read(
     }
     names = [os.fspath(path) for path in paths]
     with tempfile.TemporaryDirectory(prefix="ohmstrain-") as folder:
-        readable = [_readable(name, place, folder, said, columns) for place, name in enumerate(names)]
+        readable = [_readable(name, place, folder, arguments, columns) for place, name in enumerate(names)]
 
         def in_names(text: str) -> str:
             for given, read_from in zip(names, readable):
@@ -138,7 +138,7 @@ def read(
             return text
 
         try:
-            batch, remarks = _core.read(readable, said)
+            batch, remarks = _core.read(readable, arguments)
         except _core.OhmstrainError as error:
             named = _core.OhmstrainError(as_arguments(in_names(str(error))))
             named.file, named.row, named.column = ", ".join(names), error.row, error.column
@@ -149,17 +149,17 @@ def read(
     return table.replace_schema_metadata(metadata) if readable != names else table
 
 
-def _readable(name: str, place: int, folder: str, said: dict[str, Any], columns: Mapping[str, Any] | None) -> str:
+def _readable(name: str, place: int, folder: str, arguments: dict[str, Any], columns: Mapping[str, Any] | None) -> str:
     """Return the file itself; for a container, a Parquet file with its columns."""
     try:
-        found = _containers.table(name, columns, said["sheet"])
+        found = _containers.table(name, columns, arguments["sheet"])
     except _core.OhmstrainError as error:
         named = _core.OhmstrainError(f"{name}: {error}")
         named.file, named.row, named.column = name, None, None
         raise named from error.__cause__
     if found is None:
         return name
-    said["sheet"] = None
+    arguments["sheet"] = None
     from pyarrow import parquet
 
     path = os.path.join(folder, f"{place}.parquet")

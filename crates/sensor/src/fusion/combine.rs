@@ -49,7 +49,7 @@ mod tests {
 
     /// Two errors of standard deviations a and b and correlation r: the weight of the first is (b² − r a b) / (a² + b² − 2 r a b).
     #[test]
-    fn two_voices_are_weighted_as_bates_and_granger_do() {
+    fn two_members_are_weighted_as_bates_and_granger_do() {
         let (a, b, r) = (1.0, 2.0, 0.3);
         let members = [Member { strain: 10.0, sd: a }, Member { strain: 20.0, sd: b }];
         let fused = combine(&members, |i, j| if i == j { 1.0 } else { r }).unwrap();
@@ -61,7 +61,7 @@ mod tests {
 
     /// The second member's weight would be negative where r is above a/b.
     #[test]
-    fn a_voice_that_only_repeats_a_better_one_has_no_weight() {
+    fn a_member_that_only_repeats_a_better_one_has_no_weight() {
         let members = [Member { strain: 10.0, sd: 1.0 }, Member { strain: 20.0, sd: 2.0 }];
         assert_eq!(combine(&members, |i, j| if i == j { 1.0 } else { 0.8 }).unwrap(), members[0]);
     }

@@ -8,8 +8,8 @@ pub mod table;
 
 pub use table::FieldError;
 use table::{
-    AMOUNT, Allowed, FACTOR, GAIN, LARGEST_CHANGE, POSITIVE, RATE, SHARE, SIGNED, SPREAD, TOLD, TOLD_AMOUNT, Table,
-    short,
+    AMOUNT, ANY_NUMBER, Allowed, FACTOR, GAIN, LARGEST_CHANGE, NON_NEGATIVE, POSITIVE, RATE, SHARE, SIGNED, SPREAD,
+    Table, short,
 };
 
 use crate::params::estimator::{EstimatorParams, MotionParams, NoiseParams, PhaseParams, SettlingParams};
@@ -90,19 +90,19 @@ fn ends(table: &Table, names: [&str; 2], lower: f64, upper: f64, allowed: Allowe
 
 impl Summary {
     fn validate(&self, table: &Table) -> Result<(), FieldError> {
-        table.number("left_out_percent_fs", self.left_out_percent_fs, TOLD_AMOUNT)?;
-        self.smoothed_percent_fs.map_or(Ok(()), |error| table.number("smoothed_percent_fs", error, TOLD_AMOUNT))?;
-        table.number("static_cubic_percent_fs", self.static_cubic_percent_fs, TOLD_AMOUNT)?;
-        table.number("coverage_95_percent", self.coverage_95_percent, TOLD_AMOUNT)?;
-        table.number("width_95_percent_fs", self.width_95_percent_fs, TOLD_AMOUNT)
+        table.number("left_out_percent_fs", self.left_out_percent_fs, NON_NEGATIVE)?;
+        self.smoothed_percent_fs.map_or(Ok(()), |error| table.number("smoothed_percent_fs", error, NON_NEGATIVE))?;
+        table.number("static_cubic_percent_fs", self.static_cubic_percent_fs, NON_NEGATIVE)?;
+        table.number("coverage_95_percent", self.coverage_95_percent, NON_NEGATIVE)?;
+        table.number("width_95_percent_fs", self.width_95_percent_fs, NON_NEGATIVE)
     }
 }
 
 impl TestedSummary {
     fn validate(&self, table: &Table) -> Result<(), FieldError> {
-        table.number("filter_percent_fs", self.filter_percent_fs, TOLD_AMOUNT)?;
-        table.number("static_cubic_percent_fs", self.static_cubic_percent_fs, TOLD_AMOUNT)?;
-        table.number("coverage_95_percent", self.coverage_95_percent, TOLD_AMOUNT)
+        table.number("filter_percent_fs", self.filter_percent_fs, NON_NEGATIVE)?;
+        table.number("static_cubic_percent_fs", self.static_cubic_percent_fs, NON_NEGATIVE)?;
+        table.number("coverage_95_percent", self.coverage_95_percent, NON_NEGATIVE)
     }
 }
 
@@ -138,9 +138,9 @@ impl Validity {
     pub fn validate(&self, table: &Table) -> Result<(), FieldError> {
         ends(table, ["lower", "upper"], self.lower, self.upper, SIGNED)?;
         ends(table, ["reading_lower", "reading_upper"], self.reading_lower, self.reading_upper, POSITIVE)?;
-        table.number("fastest_rate_per_s", self.fastest_rate_per_s, TOLD_AMOUNT)?;
-        table.number("duration_s", self.duration_s, TOLD_AMOUNT)?;
-        table.number("longest_repeat_s", self.longest_repeat_s, TOLD_AMOUNT)?;
+        table.number("fastest_rate_per_s", self.fastest_rate_per_s, NON_NEGATIVE)?;
+        table.number("duration_s", self.duration_s, NON_NEGATIVE)?;
+        table.number("longest_repeat_s", self.longest_repeat_s, NON_NEGATIVE)?;
         self.longest_unturned_s.map_or(Ok(()), |longest_s| table.number("longest_unturned_s", longest_s, POSITIVE))?;
         self.resolution.map_or(Ok(()), |resolution| resolution.validate(&table.table("resolution")))
     }
@@ -148,8 +148,8 @@ impl Validity {
 
 impl Resolution {
     fn validate(self, table: &Table) -> Result<(), FieldError> {
-        table.number("step", self.step, TOLD_AMOUNT)?;
-        table.number("noise_sd", self.noise_sd, TOLD_AMOUNT)
+        table.number("step", self.step, NON_NEGATIVE)?;
+        table.number("noise_sd", self.noise_sd, NON_NEGATIVE)
     }
 }
 
@@ -223,7 +223,7 @@ impl GaugeParams {
 
 impl EstimatorParams {
     fn validate(&self, table: &Table, limits: RangeParams) -> Result<(), FieldError> {
-        table.number("score", self.score, TOLD)?;
+        table.number("score", self.score, ANY_NUMBER)?;
         table.number("strain_sd_scale", self.strain_sd_scale, FACTOR)?;
         if let Some(scale) = self.smoothed_sd_scale {
             table.number("smoothed_sd_scale", scale, FACTOR)?;
@@ -281,8 +281,8 @@ impl PhaseParams {
 
 impl RecordingInfo {
     fn validate(&self, table: &Table) -> Result<(), FieldError> {
-        table.number("first_s", self.first_s, TOLD)?;
-        table.number("last_s", self.last_s, TOLD)?;
+        table.number("first_s", self.first_s, ANY_NUMBER)?;
+        table.number("last_s", self.last_s, ANY_NUMBER)?;
         table.number("rest_reading", self.rest_reading, POSITIVE)
     }
 }
@@ -291,14 +291,14 @@ impl Uncertainty {
     fn validate(&self, table: &Table) -> Result<(), FieldError> {
         let size = self.names.len();
         table.length("values", size, self.values.len())?;
-        table.numbers("values", &self.values, TOLD)?;
+        table.numbers("values", &self.values, ANY_NUMBER)?;
         table.length("standard_errors", size, self.standard_errors.len())?;
-        table.numbers("standard_errors", &self.standard_errors, TOLD_AMOUNT)?;
+        table.numbers("standard_errors", &self.standard_errors, NON_NEGATIVE)?;
         table.length("covariance", size, self.covariance.len())?;
         for (index, row) in self.covariance.iter().enumerate() {
             let name = format!("covariance[{index}]");
             table.length(&name, size, row.len())?;
-            table.numbers(&name, row, TOLD)?;
+            table.numbers(&name, row, ANY_NUMBER)?;
         }
         Ok(())
     }

@@ -243,7 +243,7 @@ mod tests {
 
     /// An error as large as stated at one time does not last; the same error at eight times does.
     #[test]
-    fn an_error_lasts_if_it_comes_again() {
+    fn an_error_lasts_if_it_recurs() {
         let off = |count: usize| {
             let strains: Vec<_> = (0..count).map(|k| strain(60.0 * k as f64, 0.23, 0.2)).collect();
             let last_s = 60.0 * (count - 1) as f64;

@@ -14,14 +14,14 @@ impl<const B: usize, const N: usize> Naive<B, N> {
     pub fn back<const L: usize>(
         &self,
         filtered: &Hypotheses<N>,
-        (heirs, next): (&Hypotheses<N>, &[Smoothed<N>]),
+        (following, next): (&Hypotheses<N>, &[Smoothed<N>]),
         dt_s: f64,
     ) -> Vec<Smoothed<N>> {
-        let Rule::Imm(dwell) = self.rule else { return through(&filtered.all, &heirs.all, next) };
+        let Rule::Imm(dwell) = self.rule else { return through(&filtered.all, &following.all, next) };
         let (mixed, step) = (self.mixed(filtered, &dwell, dt_s), self.model.prepare(dt_s));
         let before = mixed.iter().map(|one| {
             let here = (one.mean, one.covariance);
-            let Some(place) = heirs.all.iter().position(|heir| heir.phase == one.phase) else {
+            let Some(place) = following.all.iter().position(|hypothesis| hypothesis.phase == one.phase) else {
                 return (0.0, here.0, here.1);
             };
             let moved: Transition<f64, N, L> = self.model.transition(&step, &one.mean, Direction::Known(one.phase));
@@ -56,20 +56,20 @@ fn retraced<const N: usize>(
 /// Runs Kim's smoother over merged hypotheses: each leads back to the parents of all its children, with their shares.
 fn through<const N: usize>(
     filtered: &[Hypothesis<N>],
-    heirs: &[Hypothesis<N>],
+    following: &[Hypothesis<N>],
     next: &[Smoothed<N>],
 ) -> Vec<Smoothed<N>> {
     let mut ways: Vec<Vec<Smoothed<N>>> = filtered.iter().map(|_| vec![]).collect();
-    for (heir, (weight, mean, covariance)) in heirs.iter().zip(next) {
-        let total: f64 = heir.made_of.iter().map(|child| child.log_weight.exp()).sum();
-        for child in &heir.made_of {
+    for (hypothesis, (weight, mean, covariance)) in following.iter().zip(next) {
+        let total: f64 = hypothesis.made_of.iter().map(|child| child.log_weight.exp()).sum();
+        for child in &hypothesis.made_of {
             let share = weight * child.log_weight.exp() / total;
             if share <= 1e-7 {
                 continue;
             }
             // The merged hypothesis is the child plus noise of the size of their distance.
-            let apart = heir.mean - child.posterior.0;
-            let merged = (heir.mean, child.posterior.1 + apart * apart.transpose());
+            let apart = hypothesis.mean - child.posterior.0;
+            let merged = (hypothesis.mean, child.posterior.1 + apart * apart.transpose());
             let own = retraced(&child.posterior, &SMatrix::identity(), &merged, &(*mean, *covariance));
             let parent = &filtered[child.parent];
             let here = (parent.mean, parent.covariance);

@@ -107,13 +107,13 @@ mod tests {
 
     #[test]
     fn containers_are_named_with_a_way_out() {
-        let said = |bytes: &[u8]| refusal(bytes, "run.bin").unwrap_or_default();
-        assert!(said(b"#ROSBAG V2.0\n").contains("ROS 1 bag") && said(b"#ROSBAG V2.0\n").contains("run.bin"));
+        let message = |bytes: &[u8]| refusal(bytes, "run.bin").unwrap_or_default();
+        assert!(message(b"#ROSBAG V2.0\n").contains("ROS 1 bag") && message(b"#ROSBAG V2.0\n").contains("run.bin"));
         let line = "write_csv(ohmstrain.read('run.bin'), 'out.csv')\", with the Python packages ohmstrain and scipy";
-        assert!(said(b"MATLAB 5.0 MAT-file").ends_with(line));
-        assert!(said(b"SQLite format 3\0...").contains("sqlite3 -csv -header run.bin"));
-        assert!(said(b"%PDF-1.7").contains("numbers behind it"));
-        assert_eq!(said(b"time_s,resistance_ohm\n"), "");
+        assert!(message(b"MATLAB 5.0 MAT-file").ends_with(line));
+        assert!(message(b"SQLite format 3\0...").contains("sqlite3 -csv -header run.bin"));
+        assert!(message(b"%PDF-1.7").contains("numbers behind it"));
+        assert_eq!(message(b"time_s,resistance_ohm\n"), "");
         // No conversion takes more than a line, and no signature but that of 7z begins with a digit, as numbers do.
         assert!(
             KNOWN

@@ -37,8 +37,8 @@ pub(crate) fn decide(found: &Found, answers: &Recipe) -> Decision {
         known(found, &mut questions).flatten()
     });
     // A remark that two columns, or two roles of one, have in common is made once.
-    let mut said = BTreeSet::new();
-    remarks.retain(|remark: &String| said.insert(remark.clone()));
+    let mut seen = BTreeSet::new();
+    remarks.retain(|remark: &String| seen.insert(remark.clone()));
     let readings = readings.into_iter().collect();
     let mut decision = Decision { readings, reference, temperature, remarks, questions };
     let missing = missing_answers(found, answers, &decision);

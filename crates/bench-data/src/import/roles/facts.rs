@@ -196,8 +196,10 @@ pub fn candidates(tables: &[Table]) -> Vec<Candidate> {
 /// Returns the candidates in a file, by its columns' names and units. `R_1` beside `R` is another quantity.
 pub(crate) fn among(table: usize, says: &[Option<(Role, Sureness)>]) -> Vec<Candidate> {
     let is_strong = |role: Role| says.contains(&Some((role, Sureness::Strong)));
-    let said = says.iter().enumerate().filter_map(|(column, said)| said.map(|(role, how)| (column, role, how)));
-    said.filter(|(_, role, how)| *how != Sureness::Indexed || !is_strong(*role))
+    let suggested =
+        says.iter().enumerate().filter_map(|(column, suggested)| suggested.map(|(role, how)| (column, role, how)));
+    suggested
+        .filter(|(_, role, how)| *how != Sureness::Indexed || !is_strong(*role))
         .map(|(column, role, how)| Candidate { table, column, role, is_named: how != Sureness::Weak })
         .collect()
 }
@@ -215,7 +217,7 @@ fn says(table: &Table, place: usize) -> Option<(Role, Sureness)> {
     };
     let is_since_1970 =
         |cell: &&str| nanoseconds(cell, decimal, 0).is_some_and(|count| epoch_unit(count as f64 / 1e9, 0.0).is_some());
-    let said = if column.heading == MONITOR_CLOCK {
+    let suggested = if column.heading == MONITOR_CLOCK {
         Some((Role::Time, Sureness::Weak))
     } else if !column.heading.is_empty() {
         names::role(&column.name, column.unit.as_deref()).filter(|_| !all(&|stamp| !stamp.has_time))
@@ -227,5 +229,5 @@ fn says(table: &Table, place: usize) -> Option<(Role, Sureness)> {
         number_of(&cell, decimal).is_some()
             || matches!(cell, Cell::Text(text) if is_stamp(&text) || ohms(&text, decimal).is_some())
     };
-    said.filter(|_| column.cells.cells().any(is_value))
+    suggested.filter(|_| column.cells.cells().any(is_value))
 }

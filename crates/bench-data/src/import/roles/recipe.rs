@@ -267,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_said_of_one_file_is_said_of_it_alone() {
+    fn an_answer_for_one_file_applies_to_it_alone() {
         let skip = |text: &str| text.parse::<PerFile<usize>>().unwrap();
         let recipe = Recipe { skip: vec![skip("3"), skip("2:5")], ..Recipe::default() };
         assert_eq!(recipe.read_options(0).skip, Some(3));

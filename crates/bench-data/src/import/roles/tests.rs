@@ -107,7 +107,7 @@ fn shown(decision: &Decision) -> String {
         format!("{role} {file}{} {}", place.column + 1, unit.name)
     };
     let taken: Vec<String> = rate.chain(decision.channels().into_iter().map(channel)).collect();
-    let begins = |said: String| format!("{:.40}", said.split(';').next().unwrap_or_default());
+    let begins = |text: String| format!("{:.40}", text.split(';').next().unwrap_or_default());
     let remarks = decision.remarks.iter().map(|remark| " ! ".to_owned() + begins(remark.clone()).trim());
     let questions = decision.questions.iter().map(|question| " ? ".to_owned() + begins(question.to_string()).trim());
     (taken.join(", ") + &remarks.chain(questions).collect::<String>()).trim().to_owned()

@@ -11,22 +11,22 @@ pub fn rounded(value: f64, digits: usize) -> f64 {
 }
 
 /// Rounds two different numbers to as few digits as distinguish them.
-pub fn told_apart(a: f64, b: f64) -> (f64, f64) {
+pub fn rounded_distinct(a: f64, b: f64) -> (f64, f64) {
     let pair = |digits| (rounded(a, digits), rounded(b, digits));
     (DIGITS..ALL).map(pair).find(|(a, b)| a != b).unwrap_or((a, b))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{rounded, told_apart};
+    use super::{rounded, rounded_distinct};
 
     #[test]
     fn digits_of_a_conversion_are_not_shown() {
         assert_eq!(rounded(1234.0 * 1.1, 7).to_string(), "1357.4");
-        assert_eq!(told_apart(3.0 * 0.1, 0.1 + 0.1), (0.3, 0.2));
+        assert_eq!(rounded_distinct(3.0 * 0.1, 0.1 + 0.1), (0.3, 0.2));
         // A microsecond in 1.7 billion seconds takes sixteen digits.
         let (now, before) = (1_700_000_000.000_004, 1_700_000_000.000_003);
-        let (a, b) = told_apart(now, before);
-        assert!(a > b && told_apart(1.0, 1.0) == (1.0, 1.0));
+        let (a, b) = rounded_distinct(now, before);
+        assert!(a > b && rounded_distinct(1.0, 1.0) == (1.0, 1.0));
     }
 }

@@ -9,7 +9,7 @@ use crate::import::roles::is_coarse;
 use crate::import::table::Table;
 use crate::order::{median, typical_step};
 
-use digits::told_apart;
+use digits::rounded_distinct;
 
 pub(crate) use times::Times;
 pub(crate) use values::{Values, check_positive, converted};
@@ -50,7 +50,7 @@ impl Series {
                 _ if time.is_nan() => untimed += 1,
                 Some(&last) if time == last => repeated += 1,
                 Some(&last) if time < last => {
-                    let (last, time) = told_apart(last, time);
+                    let (last, time) = rounded_distinct(last, time);
                     let place = format!("{}:{}", table.file, table.lines[row]);
                     let what = format!("expected a time after {last} s, found {time} s");
                     return Err(ImportError::question(&place, what, ANOTHER_RECORDING.map(str::to_owned)));
@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn polarity_is_not_told_from_a_few_readings() {
+    fn polarity_is_not_determined_from_a_few_readings() {
         assert_eq!(alternation(&flipping(60)), None);
         let share = alternation(&flipping(200)).unwrap();
         assert!((share - 0.02).abs() < 0.001, "{share}");

@@ -169,8 +169,8 @@ fn are_records<'a>(lines: impl Iterator<Item = &'a str>) -> bool {
         known[*label].0 += 1;
         known[*label].1 &= is_amount(value);
     }
-    let comes_again = |pairs: &Vec<(usize, &str)>| pairs.iter().all(|(label, _)| known[*label].0 > 1);
-    let fitting = all.iter().flatten().filter(|pairs| comes_again(pairs)).count();
+    let recurs = |pairs: &Vec<(usize, &str)>| pairs.iter().all(|(label, _)| known[*label].0 > 1);
+    let fitting = all.iter().flatten().filter(|pairs| recurs(pairs)).count();
     fitting * 10 > all.len() * 8 && known.iter().any(|(count, is_number)| *count > 1 && *is_number)
 }
 

@@ -280,7 +280,7 @@ mod tests {
     fn the_order_of_day_and_month_may_stay_open() {
         let open = ["05/01/2024 10:00", "06/01/2024 10:00"];
         assert_eq!(orders(open.into_iter()), [Order::Dmy, Order::Mdy]);
-        let told = ["05/01/2024 10:00", "05/13/2024 10:00"];
-        assert_eq!(orders(told.into_iter()), [Order::Mdy]);
+        let determined = ["05/01/2024 10:00", "05/13/2024 10:00"];
+        assert_eq!(orders(determined.into_iter()), [Order::Mdy]);
     }
 }

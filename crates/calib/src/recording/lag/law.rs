@@ -67,7 +67,7 @@ pub(super) fn lag_by_law(samples: &Samples) -> Result<Lag, LagError> {
     match by_law_and_gauge(samples, &errors) {
         Some(lag) if lag.is_sure() => Ok(lag),
         unsure => out_of_reach(&errors.law)
-            .map_or_else(|| unsure.ok_or(LagError::Untold), |end_s| Err(LagError::AtEnd(end_s))),
+            .map_or_else(|| unsure.ok_or(LagError::Undetermined), |end_s| Err(LagError::AtEnd(end_s))),
     }
 }
 

@@ -90,7 +90,7 @@ impl fmt::Display for Lag {
 pub enum LagError {
     /// No lag explains the readings best.
     #[error("the readings do not tell")]
-    Untold,
+    Undetermined,
     /// Too few readings or reference values, or no motion.
     #[error("too few rows with readings or reference, or no motion")]
     Short,

@@ -111,18 +111,18 @@ impl<'a> Workshop<'a> {
         // Messages name the published output instead of the draft.
         let (drafted, published) =
             (draft.display().to_string(), self.args.output.join(&job.output).display().to_string());
-        let said = |text: &str| printable(text).replace(&drafted, &published);
+        let displayed = |text: &str| printable(text).replace(&drafted, &published);
         let parsed = match job.parsed(self.args) {
             Ok(parsed) => parsed,
-            Err(error) => return entry.message = said(&error.to_string()),
+            Err(error) => return entry.message = displayed(&error.to_string()),
         };
         let messages = Messages::kept(parsed.verbosity());
-        let done = catch_unwind(AssertUnwindSafe(|| obey(parsed.command, draft, entry, &messages)));
-        entry.warnings = messages.into_warnings().iter().map(|warning| said(warning)).collect();
+        let done = catch_unwind(AssertUnwindSafe(|| run_command(parsed.command, draft, entry, &messages)));
+        entry.warnings = messages.into_warnings().iter().map(|warning| displayed(warning)).collect();
         let (code, message) = match done {
             Ok(Ok(())) => (0, String::new()),
-            Ok(Err(error)) => (error.code(), said(&error.to_string())),
-            Err(panic) => (PANICKED, said(&format!("{}: a bug: {}", job.name(), text_of(panic.as_ref())))),
+            Ok(Err(error)) => (error.code(), displayed(&error.to_string())),
+            Err(panic) => (PANICKED, displayed(&format!("{}: a bug: {}", job.name(), text_of(panic.as_ref())))),
         };
         (entry.exit_code, entry.message) = (Some(code.into()), message);
         entry.state = if code == 0 { State::Done } else { State::Failed };
@@ -130,7 +130,7 @@ impl<'a> Workshop<'a> {
 }
 
 /// Runs a command whose output goes to `draft`.
-fn obey(command: Command, draft: &Path, entry: &mut Entry, messages: &Messages) -> Result<(), CliError> {
+fn run_command(command: Command, draft: &Path, entry: &mut Entry, messages: &Messages) -> Result<(), CliError> {
     match command {
         Command::Filter(mut args) => {
             args.written.output = Some(draft.to_path_buf());

@@ -1,19 +1,19 @@
 mod evaluation;
+mod known_strains;
 mod scores;
 mod sensors;
 mod settled;
 mod summary;
-mod told;
 
 use std::path::{Path, PathBuf};
 
 pub use evaluation::Evaluation;
+use known_strains::KnownStrains;
 use ohmstrain::trace::TraceFile;
 use ohmstrain_calib::{Baselines, PublishedLaw, Samples, reference_lag, screen};
 use rayon::prelude::*;
 pub use scores::RecordingScores;
 use sensors::{JudgedSensor, Rivals, phases};
-use told::Told;
 
 use crate::args::{EvaluateArgs, Split};
 use crate::commands::hand;
@@ -229,8 +229,8 @@ fn judge(
     };
     for sensor in sensors {
         let of_whole = args.known_every.filter(|_| !sensor.is_part());
-        for told in Told::cases(recording, part, sensor.sensor.params().limits, of_whole) {
-            let scores = sensor.judge(recording, part, rest, &told, baselines, &mut judged.warnings)?;
+        for given in KnownStrains::cases(recording, part, sensor.sensor.params().limits, of_whole) {
+            let scores = sensor.judge(recording, part, rest, &given, baselines, &mut judged.warnings)?;
             judged.scores.push(RecordingScores { sample, ..scores.ok_or_else(nothing)? });
         }
     }

@@ -7,9 +7,9 @@ use ohmstrain_bench_data::segment;
 use ohmstrain_calib::{Baselines, PhaseRows, PublishedLaw, RECIPE};
 use ohmstrain_sensor::{EstimatorKind, StaticCubic};
 
+use super::known_strains::KnownStrains;
 use super::scores::{BaselineScores, LearnedScores, RecordingScores};
 use super::settled::SettledScores;
-use super::told::Told;
 use crate::args::Estimators;
 use crate::commands::calibrate::calibrate_recordings;
 use crate::commands::scoring;
@@ -106,19 +106,19 @@ impl JudgedSensor {
         self.is_part
     }
 
-    /// Scores some rows of a recording, with the filter started at the first row and given the strains of `told`; `None`
+    /// Scores some rows of a recording, with the filter started at the first row and given the strains of `given`; `None`
     /// without a reference. Doubts about those strains are added to `warnings`.
     pub fn judge(
         &self,
         recording: &TraceFile,
         part: Scored,
         rest_resistance: Option<f64>,
-        told: &Told,
+        given: &KnownStrains,
         baselines: BaselineScores,
         warnings: &mut Vec<String>,
     ) -> Result<Option<RecordingScores>, CliError> {
-        let estimated = estimate(recording, &self.sensor, rest_resistance, Some(self.kind), &told.known)?;
-        if self.calibration_s.is_none() && told.name.is_none() {
+        let estimated = estimate(recording, &self.sensor, rest_resistance, Some(self.kind), &given.known)?;
+        if self.calibration_s.is_none() && given.name.is_none() {
             let mut watch = ValidityWatch::new(&self.sensor, rest_resistance);
             for (k, row) in estimated.filtered.iter().enumerate() {
                 let reading = row.resistance.unwrap_or(f64::NAN);
@@ -138,8 +138,8 @@ impl JudgedSensor {
             split: None,
             estimator: self.name,
             sample: Sample::Out,
-            known: told.name.clone(),
-            is_part: self.is_part || told.name.is_some(),
+            known: given.name.clone(),
+            is_part: self.is_part || given.name.is_some(),
             filter,
             smoother,
             settled,

@@ -57,9 +57,10 @@ impl SettledScores {
             holds.iter().flat_map(of_hold).collect()
         };
         let (rows, early) = (until(f64::INFINITY), until(EARLY_S));
-        let told = |row: &Estimate| Some((row.settled_resistance, Some(row.settled_resistance_sd)));
+        let settled = |row: &Estimate| Some((row.settled_resistance, Some(row.settled_resistance_sd)));
         let read = |row: &Estimate| Some((row.resistance?, None));
-        let (Some(all), Some(early), Some(read)) = (scores(&rows, told), scores(&early, told), scores(&rows, read))
+        let (Some(all), Some(early), Some(read)) =
+            (scores(&rows, settled), scores(&early, settled), scores(&rows, read))
         else {
             return Ok(None);
         };
@@ -77,9 +78,9 @@ impl SettledScores {
 }
 
 /// Scores predictions of rows, with their deviations, against the last reading of their hold.
-fn scores(rows: &[(f64, &Estimate)], said: impl Fn(&Estimate) -> Option<(f64, Option<f64>)>) -> Option<Scores> {
+fn scores(rows: &[(f64, &Estimate)], prediction: impl Fn(&Estimate) -> Option<(f64, Option<f64>)>) -> Option<Scores> {
     let scored = |(truth, row): &(f64, &Estimate)| {
-        let (strain, sd) = said(row)?;
+        let (strain, sd) = prediction(row)?;
         Some(ScoredRow { time_s: row.time_s, truth: *truth, strain, sd })
     };
     ohmstrain_calib::score(&rows.iter().filter_map(scored).collect::<Vec<_>>())

@@ -77,8 +77,8 @@ fn fit_recording(recording: &TraceFile, args: &FitLawArgs, messages: &Messages) 
     let rest_reading = match args.rest_resistance {
         RestResistance::Value(value) => value,
         RestResistance::Calibrated => {
-            let said = "--rest-resistance: expected a positive number or first:N, as there is no calibration";
-            return Err(CliError::Arguments(said.into()));
+            let message = "--rest-resistance: expected a positive number or first:N, as there is no calibration";
+            return Err(CliError::Arguments(message.into()));
         }
         RestResistance::First(count) => median_of_first(count, trace.readings.values.iter().copied(), &recording.name)?,
     };

@@ -136,9 +136,9 @@ fn row(group: &[Entry], names: &[String]) -> Vec<Cell> {
         let is_here = belongs(name, first.phase);
         let own: Vec<&Estimated> =
             group.iter().filter_map(|entry| entry.fitted.fit.get(name).filter(|_| is_here)).collect();
-        let told: Vec<(f64, f64)> =
+        let determined: Vec<(f64, f64)> =
             own.iter().filter_map(|estimated| Some((estimated.value, estimated.standard_error?))).collect();
-        out.push(if told.is_empty() && !own.is_empty() { Cell::NotTold } else { mean(&told) });
+        out.push(if determined.is_empty() && !own.is_empty() { Cell::NotIdentified } else { mean(&determined) });
     }
     let worst = group.iter().map(|entry| entry.r_squared).fold(f64::INFINITY, f64::min);
     out.push(Cell::Number(worst, fixed(worst, 4)));

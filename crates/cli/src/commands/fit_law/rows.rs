@@ -18,7 +18,7 @@ pub enum Cell {
     /// A value at the limit of the search.
     AtLimit(f64),
     /// A parameter that the readings do not determine.
-    NotTold,
+    NotIdentified,
     /// No such parameter in this row.
     Nothing,
 }
@@ -30,7 +30,7 @@ impl Cell {
             None => Self::Nothing,
             Some(Estimated { value, standard_error: Some(error), .. }) => Self::Estimate(*value, *error),
             Some(Estimated { value, at_limit: true, .. }) => Self::AtLimit(*value),
-            Some(_) => Self::NotTold,
+            Some(_) => Self::NotIdentified,
         }
     }
 
@@ -39,7 +39,7 @@ impl Cell {
             Self::Text(text) | Self::Number(_, text) => text.clone(),
             Self::Estimate(value, error) => with_error(*value, *error),
             Self::AtLimit(value) => format!("{} (limit)", plain(*value)),
-            Self::NotTold => "not told".into(),
+            Self::NotIdentified => "not told".into(),
             Self::Nothing => String::new(),
         }
     }
@@ -50,7 +50,7 @@ impl Cell {
             Self::Text(text) => quoted(text),
             Self::Estimate(value, error) => return format!("{value},{error}"),
             Self::AtLimit(value) | Self::Number(value, _) => value.to_string(),
-            Self::NotTold | Self::Nothing => String::new(),
+            Self::NotIdentified | Self::Nothing => String::new(),
         };
         if has_error { value + "," } else { value }
     }
@@ -207,7 +207,7 @@ mod tests {
         let header = ["segment", "tau_0, s"].map(String::from).to_vec();
         let rows = vec![
             vec![Cell::from("a, b".to_string()), Cell::Estimate(-1.23456789e-9, 1e-10)],
-            vec![Cell::from("c_1".to_string()), Cell::NotTold],
+            vec![Cell::from("c_1".to_string()), Cell::NotIdentified],
             vec![Cell::from("d".to_string()), Cell::Number(-1.5e-7, "−1.5·10⁻⁷".into())],
         ];
         let table = LawTable { keys: 1, header, rows };

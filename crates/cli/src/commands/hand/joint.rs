@@ -169,7 +169,7 @@ impl<'a> Channel<'a> {
             return Err(format!("joint `{joint}`: expected a column `{column}`, found {}", quoted(header)));
         }
         let expected = self.sensor.params().reading;
-        if let Some(found) = self.said_unit().filter(|found| *found != expected) {
+        if let Some(found) = self.stated_unit().filter(|found| *found != expected) {
             return Err(format!(
                 "column `{column}`: joint `{joint}`: expected `{}` as in the sensor's calibration, found `{}`",
                 reading_column(expected),
@@ -187,7 +187,7 @@ impl<'a> Channel<'a> {
 
     /// Returns the unit of the readings according to the electronics, the lines above the header or the ending of the column's
     /// name.
-    fn said_unit(&self) -> Option<ReadingUnit> {
+    fn stated_unit(&self) -> Option<ReadingUnit> {
         if self.entry.front_end.is_some() || self.lines.metadata().resistance_unit.is_some() {
             return Some(ReadingUnit::Ohm);
         }

@@ -207,8 +207,8 @@ impl<'a> Session<'a> {
         self.early.push(reading);
         if self.early.len() == wanted {
             self.rest = median(self.early.clone());
-            let told = self.rest.map_or(Ok(()), |measured| self.filter.rest_resistance(measured));
-            told.map_err(|refused| of_first(&refused, wanted, &self.args.port.source()))?;
+            let outcome = self.rest.map_or(Ok(()), |measured| self.filter.rest_resistance(measured));
+            outcome.map_err(|refused| of_first(&refused, wanted, &self.args.port.source()))?;
             self.watch = ValidityWatch::new(&self.sensor, self.rest);
         }
         if self.early.len() == wanted.max(FIRST_LIVE_READINGS)
@@ -261,15 +261,15 @@ impl<'a> Session<'a> {
     pub fn toggle_record(&mut self) {
         self.message = match self.recorder.take() {
             Some(recorder) => {
-                let said = format!("recorded {} ({})", recorder.path.display(), counted(recorder.count, "row"));
-                said
+                let message = format!("recorded {} ({})", recorder.path.display(), counted(recorder.count, "row"));
+                message
             }
             None if self.counts.rows == 0 => "there is nothing to record yet".into(),
             None => match Recorder::begin(&self.args.record, &self.lines) {
                 Ok(recorder) => {
-                    let said = format!("recording to {}", recorder.path.display());
+                    let message = format!("recording to {}", recorder.path.display());
                     self.recorder = Some(recorder);
-                    said
+                    message
                 }
                 Err(error) => format!("cannot record: {error}"),
             },

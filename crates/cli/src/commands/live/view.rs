@@ -29,8 +29,8 @@ const BAR: usize = 10;
 pub fn draw(frame: &mut Frame, session: &Session, status: &str, args: &LiveArgs) {
     // A low terminal has room for the numbers, and for messages in place of the keys.
     let is_low = frame.area().height < LOW;
-    let said = if session.message.is_empty() { 0 } else { 1 };
-    let (message, keys) = if is_low { (said, 1 - said) } else { (2, 1) };
+    let message_height = if session.message.is_empty() { 0 } else { 1 };
+    let (message, keys) = if is_low { (message_height, 1 - message_height) } else { (2, 1) };
     let rows = [Constraint::Length(1), Constraint::Min(0), Constraint::Length(message), Constraint::Length(keys)];
     let [title, middle, message, keys] = Layout::vertical(rows).areas(frame.area());
     let sensor = args.estimate.sensor.file_name().unwrap_or_default().to_string_lossy();

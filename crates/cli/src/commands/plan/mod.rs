@@ -25,7 +25,7 @@ use crate::protocol_file;
 use crate::sensor_file;
 use motion::Protocols;
 use ohmstrain::number::{self, fixed, significant};
-use worth::{Sampling, Told, Worth};
+use worth::{Information, Sampling, Worth};
 
 /// Version of the output of `--json`.
 const SCHEMA: u32 = 1;
@@ -34,7 +34,7 @@ const SCHEMA: u32 = 1;
 #[derive(Serialize)]
 struct Json<'a> {
     sensor: String,
-    recordings: &'a [Told],
+    recordings: &'a [Information],
     sampling: &'a [Worth],
     /// Error at the fastest of these rates, with drift as the only disturbance, percent.
     drift_alone_percent: f64,
@@ -59,7 +59,8 @@ pub fn run(args: &PlanArgs, messages: &Messages) -> Result<(), CliError> {
     let sensor = joint.map_or(Ok(sensor.clone()), |joint| sensor.on_joint(joint))?;
     let progress = Progress::new("planning", messages);
     let protocols = Protocols::new(sensor.params());
-    let told: Vec<Told> = protocols.all().iter().map(|protocol| worth::told(&sensor, protocol)).collect();
+    let information: Vec<Information> =
+        protocols.all().iter().map(|protocol| worth::recording_information(&sensor, protocol)).collect();
     let worth = worth::sampling(&sensor, &protocols)?;
     drop(progress);
     print(|out| {
@@ -67,7 +68,7 @@ pub fn run(args: &PlanArgs, messages: &Messages) -> Result<(), CliError> {
             let Sampling { cases, drift_alone_percent, noise_alone_percent, neither_percent } = &worth;
             let json = Json {
                 sensor: name,
-                recordings: &told,
+                recordings: &information,
                 sampling: cases,
                 drift_alone_percent: *drift_alone_percent,
                 noise_alone_percent: *noise_alone_percent,
@@ -75,7 +76,7 @@ pub fn run(args: &PlanArgs, messages: &Messages) -> Result<(), CliError> {
             };
             return output::json(out, SCHEMA, &json);
         }
-        Ok(out.write_all(text(&sensor, &name, &protocols, &told, &worth).as_bytes())?)
+        Ok(out.write_all(text(&sensor, &name, &protocols, &information, &worth).as_bytes())?)
     })
 }
 
@@ -122,7 +123,7 @@ fn illustrative(args: &PlanArgs, messages: &Messages) -> Result<Sensor, CliError
     Ok(calibrate_recordings(&[recording], calibration, &Progress::new("simulating", messages))?.sensor)
 }
 
-fn text(sensor: &Sensor, name: &str, protocols: &Protocols, told: &[Told], worth: &Sampling) -> String {
+fn text(sensor: &Sensor, name: &str, protocols: &Protocols, information: &[Information], worth: &Sampling) -> String {
     let params = sensor.params();
     let (factor, unit) = number::shown(params.quantity);
     let shown = |x: f64| format!("{}{unit}", significant(factor * x, 3));
@@ -138,11 +139,11 @@ fn text(sensor: &Sensor, name: &str, protocols: &Protocols, told: &[Told], worth
         speeds.join(", ")
     ));
     let mut recordings = output::wrapped_table(["recording", "minutes", "told", "worst", "condition", "left open"]);
-    for one in told {
+    for one in information {
         recordings.add_row([
             one.protocol.to_string(),
             fixed(one.minutes, 1),
-            format!("{} of {}", one.told, one.parameters),
+            format!("{} of {}", one.determined, one.parameters),
             one.worst_percent.map_or("-".into(), |worst| format!("± {} %", significant(worst, 2))),
             format!("{:.0e}", one.condition),
             one.left_open.clone(),
@@ -154,7 +155,7 @@ fn text(sensor: &Sensor, name: &str, protocols: &Protocols, told: &[Told], worth
         left_open.set_constraint(ColumnConstraint::ContentWidth);
     }
     text += &format!("{recordings}\n");
-    if let Some(best) = worth::best(told) {
+    if let Some(best) = worth::best(information) {
         text += &wrapped(&format!("No other tells more in less time: {}.\n", best.protocol));
     }
     text += &wrapped(&format!(

@@ -25,7 +25,7 @@ pub const BITS: [u32; 4] = [0, 12, 10, 8];
 /// about sampling.
 const DRAWS: u64 = 5;
 /// Largest standard error of a determined parameter, as a share of its value.
-const TOLD: f64 = 0.25;
+const DETERMINED_BELOW: f64 = 0.25;
 /// Factor up to which an error is hardly larger than another.
 const HARDLY: f64 = 1.1;
 /// Smallest reading, as a share of R₀: the drift also represents errors of the law, and can exceed the resistance.
@@ -37,13 +37,14 @@ const SETTLING_S: f64 = 5.0;
 
 /// Information of a recording.
 #[derive(Serialize)]
-pub struct Told {
+pub struct Information {
     pub protocol: String,
     pub minutes: f64,
     /// Parameters of the law.
     pub parameters: usize,
     /// Number of parameters with a standard error below a quarter of their value.
-    pub told: usize,
+    #[serde(rename = "told")]
+    pub determined: usize,
     /// Largest standard error of the determined parameters, percent.
     pub worst_percent: Option<f64>,
     /// Condition number of the Fisher information, its diagonal scaled to one.
@@ -89,9 +90,9 @@ impl Sampling {
 }
 
 /// Returns the shortest recording that determines the largest number of parameters.
-pub fn best(recordings: &[Told]) -> Option<&Told> {
-    let most = recordings.iter().map(|one| one.told).max()?;
-    recordings.iter().filter(|one| one.told == most).min_by(|a, b| a.minutes.total_cmp(&b.minutes))
+pub fn best(recordings: &[Information]) -> Option<&Information> {
+    let most = recordings.iter().map(|one| one.determined).max()?;
+    recordings.iter().filter(|one| one.determined == most).min_by(|a, b| a.minutes.total_cmp(&b.minutes))
 }
 
 /// Factors on each kind of noise, relative to the calibrated noise.
@@ -141,7 +142,7 @@ fn times(rows: usize, rate_hz: f64) -> Vec<f64> {
 }
 
 /// Computes a recording's information about the law's parameters: their Fisher information, at the sensor's own values.
-pub fn told(sensor: &Sensor, protocol: &Protocol) -> Told {
+pub fn recording_information(sensor: &Sensor, protocol: &Protocol) -> Information {
     let minutes = protocol.strain.len() as f64 / RATE_HZ / 60.0;
     let (names, values) = parameters(&sensor.params().law);
     let information = information(sensor, &protocol.strain);
@@ -157,14 +158,14 @@ pub fn told(sensor: &Sensor, protocol: &Protocol) -> Told {
         squares.map(|(x, value)| x * x / value.max(f64::EPSILON * most)).sum::<f64>().sqrt() / scale[i]
     };
     let relative: Vec<f64> = values.iter().enumerate().map(|(i, value)| (error(i) / value).abs()).collect();
-    let is_told = |share: &f64| *share < TOLD;
-    let open = relative.iter().zip(&names).filter(|(share, _)| !is_told(share)).max_by(|a, b| a.0.total_cmp(b.0));
-    Told {
+    let is_determined = |share: &f64| *share < DETERMINED_BELOW;
+    let open = relative.iter().zip(&names).filter(|(share, _)| !is_determined(share)).max_by(|a, b| a.0.total_cmp(b.0));
+    Information {
         protocol: protocol.name.clone(),
         minutes,
         parameters: relative.len(),
-        told: relative.iter().filter(|share| is_told(share)).count(),
-        worst_percent: relative.iter().copied().filter(is_told).reduce(f64::max).map(|share| 100.0 * share),
+        determined: relative.iter().filter(|share| is_determined(share)).count(),
+        worst_percent: relative.iter().copied().filter(is_determined).reduce(f64::max).map(|share| 100.0 * share),
         condition: most / least,
         left_open: open.map_or_else(String::new, |(_, name)| name.clone()),
     }

@@ -222,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn a_spoiled_step_goes_back_and_is_made_again() {
+    fn a_spoiled_step_goes_back_and_is_repeated() {
         let mut pacer = pacer();
         pacer.advance(0.0);
         pacer.advance(15.0);

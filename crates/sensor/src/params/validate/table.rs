@@ -49,9 +49,9 @@ pub const FACTOR: Allowed = Allowed { least: 1e-3, most: 1e3 };
 /// Weights of training rows, and entries of matrices made of them.
 pub const WEIGHT: Allowed = Allowed { least: -1e15, most: 1e15 };
 /// Number for information only: a score, or a variance of undetermined parameters.
-pub const TOLD: Allowed = Allowed { least: -f64::INFINITY, most: f64::INFINITY };
+pub const ANY_NUMBER: Allowed = Allowed { least: -f64::INFINITY, most: f64::INFINITY };
 /// Number for information only, zero or more.
-pub const TOLD_AMOUNT: Allowed = Allowed { least: 0.0, most: f64::INFINITY };
+pub const NON_NEGATIVE: Allowed = Allowed { least: 0.0, most: f64::INFINITY };
 
 /// Largest change of resistance, relative to R₀, of a gauge curve within the law's range.
 pub const LARGEST_CHANGE: f64 = 1e6;

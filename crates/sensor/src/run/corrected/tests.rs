@@ -296,7 +296,7 @@ fn a_corrected_filter_says_what_the_bare_one_beside_it_and_its_readings_say() {
 /// Tests that with a fixed lag every row comes out once and in order, mixed with its first estimate, whatever rows were
 /// rejected in between.
 #[test]
-fn a_lagged_row_is_mixed_with_what_was_said_of_it() {
+fn a_lagged_row_is_mixed_with_its_first_estimate() {
     let learned = Learned::new(&params(), LIMITS);
     let [mut now, mut lagging] = [0; 2].map(|_| live(Some(&learned), None));
     let mut bare = live(None, None);

@@ -9,24 +9,24 @@ use ohmstrain::trace::TraceFile;
 const NEAR_END: f64 = 0.1;
 
 /// Known strains that an estimator receives from the reference before it is scored with it.
-pub struct Told {
+pub struct KnownStrains {
     /// Name in tables; `None` if there are no known strains.
     pub name: Option<String>,
     /// The strains.
     pub known: Vec<Known>,
 }
 
-impl Told {
+impl KnownStrains {
     /// Returns the cases: no known strain; and, if an interval in s is given, one known strain after each such interval, and
     /// the first strains near the ends of the range. All of them lie in the scored part, and within the estimator's limits.
     pub fn cases(recording: &TraceFile, part: Scored, limits: RangeParams, every_s: Option<f64>) -> Vec<Self> {
         let mut cases = vec![Self { name: None, known: Vec::new() }];
         if let Some(every_s) = every_s {
             let reach = KNOWN_BEYOND * limits.span();
-            let can_be_told = |known: &Known| (limits.lower - reach..=limits.upper + reach).contains(&known.strain);
+            let is_usable = |known: &Known| (limits.lower - reach..=limits.upper + reach).contains(&known.strain);
             let rows =
                 (0..recording.trace.len()).map(|row| Known::new(recording.trace.time_s[row], recording.truth(row)));
-            let rows: Vec<Known> = rows.filter(|known| part.holds(known.time_s) && can_be_told(known)).collect();
+            let rows: Vec<Known> = rows.filter(|known| part.holds(known.time_s) && is_usable(known)).collect();
             cases.push(Self { name: Some(format!("known every {every_s} s")), known: every(&rows, every_s) });
             cases.push(Self { name: Some("rest and stretch known".into()), known: ends(&rows) });
         }
@@ -60,7 +60,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn strains_are_told_every_so_often_or_near_the_ends() {
+    fn known_strains_are_periodic_or_near_the_ends() {
         let rows: Vec<Known> = (0..100).map(|k| Known::new(f64::from(k), f64::from((k * 7) % 100))).collect();
         let times: Vec<f64> = every(&rows, 30.0).iter().map(|known| known.time_s).collect();
         assert_eq!(times, [0.0, 30.0, 60.0, 90.0]);

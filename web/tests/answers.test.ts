@@ -2,17 +2,17 @@
 
 import { expect, test } from "vitest";
 import { guess, header } from "../src/columns";
-import { Said, quoted } from "../src/said";
+import { Answers, quoted } from "../src/answers";
 import { LineSplitter } from "../src/serial";
 
-test("what is said becomes flags as a shell takes them", () => {
-  const said = new Said();
-  said.column("2", "resistance", "ratio");
-  said.unit("ratio", "percent");
-  said.answer("--unit strain=K if 1 V is that much");
-  said.answer("--decimal ,");
-  said.gaugeLength = "30";
-  expect(said.flags()).toBe(
+test("answers become flags in the syntax of a shell", () => {
+  const answers = new Answers();
+  answers.column("2", "resistance", "ratio");
+  answers.unit("ratio", "percent");
+  answers.answer("--unit strain=K if 1 V is that much");
+  answers.answer("--decimal ,");
+  answers.gaugeLength = "30";
+  expect(answers.flags()).toBe(
     "--column resistance=none --column ratio=2 --unit ratio=percent --unit strain=K --gauge-length-mm 30 --decimal ,",
   );
   expect(quoted("it's")).toBe("'it'\\''s'");

@@ -5,7 +5,7 @@ export function quoted(word: string): string {
   return /^[\w\-+=./:,@%]+$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`;
 }
 
-export class Said {
+export class Answers {
   gaugeLength = "";
   rate = "";
   others = "";
@@ -13,8 +13,8 @@ export class Said {
   private readonly units = new Map<string, string>();
 
   /** The same, to say more of. */
-  copy(): Said {
-    const one = new Said();
+  copy(): Answers {
+    const one = new Answers();
     Object.assign(one, { gaugeLength: this.gaugeLength, rate: this.rate, others: this.others });
     for (const [role, column] of this.columns) one.columns.set(role, column);
     for (const [role, unit] of this.units) one.units.set(role, unit);

@@ -16,7 +16,7 @@ pub(crate) trait StepReading<T: Scalar>: Copy {
     fn as_option(self) -> Option<Reading<T>>;
 
     /// Returns the reading for another try of a refused step, or the refusal if another try does not help.
-    fn again<S: Switch<T>, const B: usize, const N: usize, G: Curve<T>>(
+    fn for_retry<S: Switch<T>, const B: usize, const N: usize, G: Curve<T>>(
         self,
         kernel: &SparseEkf<T, S, B, N, G>,
         tries: u32,
@@ -30,7 +30,7 @@ impl<T: Scalar> StepReading<T> for Reading<T> {
         Some(self)
     }
 
-    fn again<S: Switch<T>, const B: usize, const N: usize, G: Curve<T>>(
+    fn for_retry<S: Switch<T>, const B: usize, const N: usize, G: Curve<T>>(
         self,
         kernel: &SparseEkf<T, S, B, N, G>,
         tries: u32,
@@ -46,7 +46,7 @@ impl<T: Scalar> StepReading<T> for Option<Reading<T>> {
         self
     }
 
-    fn again<S: Switch<T>, const B: usize, const N: usize, G: Curve<T>>(
+    fn for_retry<S: Switch<T>, const B: usize, const N: usize, G: Curve<T>>(
         self,
         kernel: &SparseEkf<T, S, B, N, G>,
         tries: u32,
