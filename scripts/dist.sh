@@ -31,7 +31,7 @@ mkdir -p "dist/$name/completions"
 cp "$binary" README.md ARCHITECTURE.md CONTRIBUTING.md NOTATION.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE "dist/$name"
 cp -r docs guide "dist/$name"
 # What README and docs refer to.
-cp --parents crates/ohmstrain/examples/live.rs crates/python/examples/ohmstrain.ipynb {bench,embedded}/README.md "dist/$name"
+cp --parents crates/ohmstrain/examples/live.rs crates/python/examples/ohmstrain.ipynb {bench,embedded,crates/c,web/package}/README.md "dist/$name"
 "$binary" man -o "dist/$name/man"
 # Named as each shell looks for them.
 for file in bash:ohmstrain.bash zsh:_ohmstrain fish:ohmstrain.fish powershell:_ohmstrain.ps1 elvish:ohmstrain.elv; do

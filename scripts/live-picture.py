@@ -49,10 +49,13 @@ def screens(command, folder):
     stream = pyte.ByteStream(screen)
     child, terminal = pty.fork()
     if child == 0:
-        os.chdir(folder)
-        os.environ["TERM"] = "xterm-256color"
-        os.execv(command[0], command)
-    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", ROWS, COLUMNS, 0, 0))
+        try:
+            fcntl.ioctl(0, termios.TIOCSWINSZ, struct.pack("HHHH", ROWS, COLUMNS, 0, 0))
+            os.chdir(folder)
+            os.environ["TERM"] = "xterm-256color"
+            os.execv(command[0], command)
+        finally:
+            os._exit(127)
     start, found = time.monotonic(), []
     while len(found) < round(LASTS_S / EVERY_S):
         due = start + WAITS_S + EVERY_S * len(found)
@@ -61,9 +64,14 @@ def screens(command, folder):
                 stream.feed(os.read(terminal, 65536))
         found.append(tuple(runs(screen.buffer[row]) for row in range(ROWS)))
     os.write(terminal, b"q")
-    time.sleep(0.5)
-    os.close(terminal)
-    os.waitpid(child, 0)
+    try:
+        while os.read(terminal, 65536):
+            pass
+    except OSError:  # The program has closed its end.
+        pass
+    _, status = os.waitpid(child, 0)
+    if status:
+        sys.exit(f"{' '.join(command)}: expected it to end well, found status {status}")
     return found
 
 
@@ -82,7 +90,7 @@ def drawn(row, runs):
     for text, colour, bold in runs:
         for piece in re.finditer(r"\S+(?: \S+)*", text):
             x, y = MARGIN + (column + piece.start()) * CELL_WIDTH, MARGIN + (row + 0.75) * CELL_HEIGHT
-            fill = "" if colour == "default" else f' fill="{COLOURS.get(colour, "#" + colour)}"'
+            fill = "" if colour == "default" else f' fill="{COLOURS.get(colour) or "#" + colour}"'
             weight = ' font-weight="bold"' if bold else ""
             width = len(piece[0]) * CELL_WIDTH
             texts.append(f'<text x="{x}" y="{y:g}" textLength="{width}"{fill}{weight}>{html.escape(piece[0])}</text>')

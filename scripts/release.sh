@@ -9,8 +9,8 @@
 #                             c        the library for programs in C, static and shared, which reads a sensor when it runs; and an
 #                                      exported filter of a simulated sensor as an Arduino library
 #                             crates   a .crate file for each crate, each built from what is in it
-#                             check    licences and advisories of dependencies (deny.toml), and whether the program compiles with the
-#                                      oldest Rust, for Windows and for macOS
+#                             check    licences and advisories of dependencies (deny.toml), public names against the last release's tag,
+#                                      and whether the program compiles with the oldest Rust, for Windows and for macOS
 #
 # Prints the size of each, the oldest glibc that will do, and how long the job took that it was tried on.
 #
@@ -191,7 +191,7 @@ npm() {
 
 # The library for programs in C, linked by zig on Linux so that it runs with glibc 2.17.
 library() {
-    local packed name=ohmstrain-c-$version-$host built=${CARGO_TARGET_DIR:-target}/release clean start
+    local packed name=ohmstrain-c-$version-$host built=${CARGO_TARGET_DIR:-target}/release clean file start
     if [[ $host == *-linux-gnu ]]; then
         tools
         PATH=$tools/bin:$PATH cargo-zigbuild build --quiet --locked --release -p ohmstrain-c --target "$host.2.17"
@@ -203,18 +203,22 @@ library() {
     mkdir -p "$packed/$name/lib"
     cp -r crates/c/include crates/c/examples crates/c/README.md LICENSE-MIT LICENSE-APACHE "$packed/$name"
     cp crates/ohmstrain/examples/sensor.toml "$packed/$name/examples"
-    cp "$built"/libohmstrain_c.{a,so,dylib} "$packed/$name/lib" 2>/dev/null || true
+    for file in "$built"/libohmstrain_c.{a,so,dylib}; do
+        [[ ! -e $file ]] || cp "$file" "$packed/$name/lib"
+    done
+    [[ -e $packed/$name/lib/libohmstrain_c.a ]] || die "no library for C in $built"
     tar -C "$packed" -czf "$out/$name.tar.gz" "$name"
     clean=$(mktemp -d)
     tar -C "$clean" -xzf "$out/$name.tar.gz"
     start=$SECONDS
     (
         cd "$clean/$name/examples"
-        cc -std=c99 -O2 filter.c -I../include ../lib/libohmstrain_c.a -lm -lpthread -ldl -o filter
+        "${CC:-cc}" -std=c99 -O2 filter.c -I../include ../lib/libohmstrain_c.a -lm -lpthread -ldl -o filter
         printf 'time_s,resistance_ohm\n0.00,1600\n0.05,1632\n0.10,1680\n' >readings.csv
-        [[ $(./filter sensor.toml readings.csv | wc -l) -eq 4 ]] || die "the library for C filtered nothing"
-        cc -std=c99 -O2 filter.c -I../include -L../lib -lohmstrain_c -lm -o shared
-        [[ $(LD_LIBRARY_PATH=../lib ./shared sensor.toml readings.csv | wc -l) -eq 4 ]] || die "the shared library filtered nothing"
+        ./filter sensor.toml readings.csv >strain.csv
+        [[ $(wc -l <strain.csv) -eq 4 ]] || die "the library for C filtered nothing"
+        "${CC:-cc}" -std=c99 -O2 filter.c -I../include -L../lib -lohmstrain_c -lm -Wl,-rpath,"$PWD/../lib" -o shared
+        ./shared sensor.toml readings.csv | cmp - strain.csv || die "the shared library filters otherwise than the static one"
     )
     made "$out/$name.tar.gz" "$(glibc "$(echo "$packed/$name/lib"/*.so)"), a C99 compiler" $((SECONDS - start))
     rm -rf "$clean" "$packed"
@@ -259,10 +263,17 @@ check() {
     else
         echo "NOT CHECKED: advisories, since their list cannot be had here" >&2
     fi
-    local minimum system
+    local minimum system tag
+    tag=$(git tag --list 'v*' --sort=-version:refname | head -n 1)
+    if [[ -n $tag ]]; then
+        cargo install --quiet --locked --root "$tools/cargo" --version '>=0.45, <1' cargo-semver-checks
+        "$tools/cargo/bin/cargo-semver-checks" semver-checks --workspace --exclude ohmstrain-tests --baseline-rev "$tag"
+    else
+        echo "NOT CHECKED: public names against the last release, since no tag is called v*" >&2
+    fi
     minimum=$(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
     if timeout 300 rustup toolchain install "$minimum" --profile minimal >/dev/null 2>&1; then
-        cargo "+$minimum" check --quiet --locked -p ohmstrain-cli --target-dir "$tools/minimum"
+        cargo "+$minimum" check --quiet --locked -p ohmstrain-cli -p ohmstrain-c --target-dir "$tools/minimum"
         echo "Rust $minimum: compiles"
     else
         echo "NOT CHECKED: Rust $minimum, since rustup does not have it here" >&2
@@ -270,7 +281,7 @@ check() {
     tools
     for system in x86_64-pc-windows-gnu aarch64-apple-darwin; do
         if has_target "$system"; then
-            PATH=$tools/bin:$PATH cargo-zigbuild check --quiet --locked -p ohmstrain-cli --target "$system"
+            PATH=$tools/bin:$PATH cargo-zigbuild check --quiet --locked -p ohmstrain-cli -p ohmstrain-c --target "$system"
             echo "$system: compiles"
         else
             echo "NOT CHECKED: $system, since rustup does not have it here" >&2

@@ -32,7 +32,7 @@ PARTS = {
 def pages():
     """Markdown files that are kept in the repository, but for templates and the paper."""
     listed = subprocess.run(["git", "ls-files", "-co", "--exclude-standard", "*.md"], cwd=ROOT, capture_output=True, text=True, check=True)
-    apart = re.compile(r"(^|/)(\.github|src/(?!.*\.md$)|templates|examples|paper)/|introduction\.md$|preset-findings\.md$")
+    apart = re.compile(r"(^|/)(\.github|templates|examples|paper)/|introduction\.md$|preset-findings\.md$")
     return [name for name in listed.stdout.splitlines() if not apart.search(name) and name != "guide/src/SUMMARY.md"]
 
 
@@ -107,7 +107,10 @@ def api():
 
 def main(folder):
     folder = Path(folder)
-    shutil.rmtree(folder, ignore_errors=True)
+    if folder.exists():
+        if not (folder / "book.toml").exists():
+            sys.exit(f"{folder}: expected a folder that this program has written, or none")
+        shutil.rmtree(folder)
     source = folder / "src"
     kept = pages()
     for page in kept:

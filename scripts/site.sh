@@ -5,10 +5,12 @@
 # Installs mdbook and LinkChecker into target/site-tools if they are missing.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-readonly target=${CARGO_TARGET_DIR:-$PWD/target}
+target=$(realpath -m "${CARGO_TARGET_DIR:-target}")
+readonly target
 readonly tools=$target/site-tools site=$target/site
 PATH=$tools/bin:$PATH
 
+mkdir -p "$tools/bin"
 command -v mdbook >/dev/null || cargo install --quiet --locked --root "$tools" --version '^0.5' --no-default-features mdbook
 if ! command -v linkchecker >/dev/null; then
     "${PYTHON3:-python3}" -m venv "$tools/python"
@@ -16,7 +18,7 @@ if ! command -v linkchecker >/dev/null; then
     ln -sf "$tools/python/bin/linkchecker" "$tools/bin/linkchecker"
 fi
 
-rm -rf "$site"
+rm -rf "$site" "$target/doc"
 scripts/site-book.py "$target/site-book"
 mdbook build --dest-dir "$site" "$target/site-book"
 RUSTDOCFLAGS="-D warnings" cargo doc --locked --quiet --workspace --no-deps --all-features --exclude ohmstrain-tests
@@ -26,5 +28,5 @@ cat >"$target/site-book/linkcheckerrc" <<'RC'
 [AnchorCheck]
 RC
 # rustdoc has checked the links of its own pages.
-linkchecker --config "$target/site-book/linkcheckerrc" --no-status --no-warnings --no-follow-url '/site/api/' "$site/index.html"
+linkchecker --config "$target/site-book/linkcheckerrc" --no-status --no-follow-url '/site/api/' "$site/index.html"
 echo "$site/index.html"

@@ -3,10 +3,11 @@
  * The sensor is a `sensor.toml`, read when the program runs. For a microcontroller `ohmstrain export --target c` writes one sensor's
  * filter as C source instead.
  *
- * Functions that return a pointer return NULL on failure, the others 0 on success; ohmc_error() says what was wrong. A failed step leaves
- * the filter as it was. A sensor may be shared by threads; a filter belongs to one thread at a time.
+ * Functions that return a pointer return NULL on failure, the others 0 on success; ohmc_error() says what was wrong. A failed call leaves
+ * the filter as it was. NULL for a sensor or a filter is a failure, but for the functions that free. A sensor may be shared by threads; a
+ * filter belongs to one thread at a time. Text and paths are UTF-8. For a sensor that was calibrated in degrees, read degrees for strain.
  *
- *     cc program.c -Iinclude -Llib -l:libohmstrain_c.a -lm -lpthread -ldl
+ *     cc program.c -Iinclude lib/libohmstrain_c.a -lm -lpthread -ldl
  */
 #ifndef OHMSTRAIN_C_H
 #define OHMSTRAIN_C_H
@@ -23,7 +24,8 @@ typedef struct ohmc_sensor ohmc_sensor;
 /* A filter of a sensor, with its state. */
 typedef struct ohmc_filter ohmc_filter;
 
-/* Flags of an estimate, as in the column `flags` of estimates.csv. */
+/* Flags of an estimate, as in the column `flags` of estimates.csv. OHMC_SATURATED is for readings in a converter's codes, which this
+ * library does not take. */
 enum ohmc_flag {
     OHMC_MISSING = 1 << 0,
     OHMC_SATURATED = 1 << 1,
@@ -41,7 +43,7 @@ enum ohmc_flag {
     OHMC_REST_MOVED = 1 << 13
 };
 
-/* An estimate: the columns of estimates.csv. Numbers that do not exist are NaN. */
+/* An estimate: the columns of estimates.csv but for the reading. Numbers that do not exist are NaN. */
 typedef struct ohmc_estimate {
     double time_s;
     double strain, strain_sd;               /* within the sensor's limits; standard deviation */
@@ -60,7 +62,7 @@ typedef struct ohmc_estimate {
 /* Version of the library, such as "0.2.0". */
 const char *ohmc_version(void);
 
-/* What was wrong with the last call of this thread that failed; "" if none has. Valid until the next call. */
+/* What was wrong with the last call of this thread that failed; "" if none has. Valid until the next failure. */
 const char *ohmc_error(void);
 
 /* Reads a sensor from the text of a sensor.toml, or from a file. */
@@ -76,13 +78,14 @@ void ohmc_filter_free(ohmc_filter *filter);
 /* Takes a reading in the sensor's unit at a time, s, after the last one. NaN is a missing reading. */
 int ohmc_filter_step(ohmc_filter *filter, double time_s, double reading, ohmc_estimate *estimate);
 
-/* Gives the strain at the last row, with a standard deviation, and the estimate that follows from it. */
+/* Gives the strain at the last row, with a standard deviation, and the estimate that follows from it. Before the first row it is the
+ * strain of that row, and the estimate's time is NaN. */
 int ohmc_filter_know(ohmc_filter *filter, double strain, double sd, ohmc_estimate *estimate);
 
 /* Sets the reading of the rested sensor from now on, in its unit. */
 int ohmc_filter_rest_resistance(ohmc_filter *filter, double measured);
 
-/* Estimates all rows of a recording from all of its readings. */
+/* Estimates all rows of a recording from all of its readings. estimates has room for as many rows, and overlaps neither column. */
 int ohmc_smooth(const ohmc_sensor *sensor, size_t rows, const double *time_s, const double *reading, ohmc_estimate *estimates);
 
 #ifdef __cplusplus

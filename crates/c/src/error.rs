@@ -1,3 +1,4 @@
+use std::any::Any;
 use std::cell::RefCell;
 use std::ffi::{CString, c_char, c_int};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -12,7 +13,7 @@ thread_local! {
 pub struct Failure(pub String);
 
 impl Failure {
-    /// A pointer that must not be null.
+    /// Describes a pointer that must not be null.
     pub fn null(name: &str) -> Self {
         Self(format!("{name}: expected a pointer, found NULL"))
     }
@@ -24,21 +25,31 @@ impl From<ohmstrain::Error> for Failure {
     }
 }
 
-/// Returns the message of the last call of this thread that failed, "" if none has.
+/// Refuses a null pointer.
+pub fn not_null<T>(pointer: *const T, name: &str) -> Result<(), Failure> {
+    if pointer.is_null() { Err(Failure::null(name)) } else { Ok(()) }
+}
+
+/// Returns the message of the last call of this thread that failed, "" if none has. It is valid until the next failure.
 #[unsafe(no_mangle)]
 pub extern "C" fn ohmc_error() -> *const c_char {
-    LAST.with_borrow(|message| message.as_ptr())
+    // A thread that ends has no messages any more.
+    LAST.try_with(|message| message.borrow().as_ptr()).unwrap_or(c"".as_ptr())
 }
 
 /// Runs a call, and keeps the message of its failure.
 fn run<T>(call: impl FnOnce() -> Result<T, Failure>) -> Option<T> {
-    let done = catch_unwind(AssertUnwindSafe(call))
-        .unwrap_or_else(|_| Err(Failure("the library has a bug: please report it".into())));
+    let done = catch_unwind(AssertUnwindSafe(call)).unwrap_or_else(|panic| Err(Failure(described(&*panic))));
     done.inspect_err(|failure| {
-        // A message has no zeros of its own but those of foreign text.
-        LAST.set(CString::new(failure.0.replace('\0', " ")).unwrap_or_default());
+        let message = CString::new(failure.0.replace('\0', " ")).unwrap_or_default();
+        let _ = LAST.try_with(|last| last.replace(message));
     })
     .ok()
+}
+
+fn described(panic: &(dyn Any + Send)) -> String {
+    let words = panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+    format!("the library has a bug, please report it: {}", words.unwrap_or("a panic"))
 }
 
 /// Runs a call that makes something, which then belongs to the caller; null on failure.

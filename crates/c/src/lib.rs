@@ -1,19 +1,27 @@
 //! C library: `ohmstrain`'s sensors, filters and smoother behind the functions of `include/ohmstrain_c.h`.
 //!
-//! Pointers that a caller passes must come from this library and must not be freed before; text is UTF-8 that ends with a
-//! zero. A null pointer is an error, not undefined behaviour. Panics do not cross into C: they are errors.
+//! Pointers that a caller passes must come from this library and must not have been freed; text is UTF-8 that ends with a zero.
+//! A null pointer is an error, not undefined behaviour. Estimates are written and never read, so their memory may be
+//! uninitialised. Panics do not cross into C: they are errors, and a filter that panicked refuses further use.
+
+#[cfg(panic = "abort")]
+compile_error!("panics must unwind to the boundary of the library");
 
 mod error;
 mod estimate;
+mod filter;
 
 use std::ffi::{CStr, c_char, c_int};
 use std::slice;
 
-use ohmstrain::{Filter, Sensor};
+use ohmstrain::Sensor;
 
 pub use error::ohmc_error;
-use error::{Failure, returned, status};
+use error::{Failure, not_null, returned, status};
 pub use estimate::Estimate;
+pub use filter::{
+    Handle, ohmc_filter_free, ohmc_filter_know, ohmc_filter_new, ohmc_filter_rest_resistance, ohmc_filter_step,
+};
 
 /// Returns the version of the library, a text that ends with a zero.
 #[unsafe(no_mangle)]
@@ -61,93 +69,11 @@ pub unsafe extern "C" fn ohmc_sensor_free(sensor: *mut Sensor) {
     }
 }
 
-/// Makes a filter; NaN for a reading at rest or a strain at the start that is not known.
+/// Estimates all rows of a recording from all of its readings. Returns 0, or 1 on failure. Without rows the pointers may be null.
 ///
 /// # Safety
-/// `sensor` is null or a sensor of this library.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn ohmc_filter_new(
-    sensor: *const Sensor,
-    rest_resistance: f64,
-    initial_strain: f64,
-) -> *mut Filter {
-    returned(|| {
-        // SAFETY: as this function's.
-        let mut builder = unsafe { sensor.as_ref() }.ok_or(Failure::null("sensor"))?.filter();
-        if !rest_resistance.is_nan() {
-            builder = builder.rest_resistance(rest_resistance);
-        }
-        if !initial_strain.is_nan() {
-            builder = builder.initial_strain(initial_strain);
-        }
-        Ok(builder.build()?)
-    })
-}
-
-/// Frees a filter; null is nothing to free.
-///
-/// # Safety
-/// `filter` is null or comes from this library, and is not used afterwards.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn ohmc_filter_free(filter: *mut Filter) {
-    if !filter.is_null() {
-        // SAFETY: it was made by `Box::into_raw`, and belongs to the caller.
-        drop(unsafe { Box::from_raw(filter) });
-    }
-}
-
-/// Takes a reading, NaN for a missing one, at a time, s, after the last one. Returns 0, or 1 on failure.
-///
-/// # Safety
-/// `filter` is null or a filter of this library that no other thread uses; `estimate` is null or has room for one.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn ohmc_filter_step(
-    filter: *mut Filter,
-    time_s: f64,
-    reading: f64,
-    estimate: *mut Estimate,
-) -> c_int {
-    status(|| {
-        // SAFETY: as this function's.
-        let (filter, estimate) = unsafe { (filter.as_mut(), estimate.as_mut()) };
-        let (filter, estimate) = (filter.ok_or(Failure::null("filter"))?, estimate.ok_or(Failure::null("estimate"))?);
-        *estimate = Estimate::from(&filter.step(time_s, reading)?);
-        Ok(())
-    })
-}
-
-/// Gives the strain at the last row, with a standard deviation. Returns 0, or 1 on failure.
-///
-/// # Safety
-/// As for [`ohmc_filter_step`].
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn ohmc_filter_know(filter: *mut Filter, strain: f64, sd: f64, estimate: *mut Estimate) -> c_int {
-    status(|| {
-        // SAFETY: as this function's.
-        let (filter, estimate) = unsafe { (filter.as_mut(), estimate.as_mut()) };
-        let (filter, estimate) = (filter.ok_or(Failure::null("filter"))?, estimate.ok_or(Failure::null("estimate"))?);
-        *estimate = Estimate::from(&filter.know(strain, sd)?);
-        Ok(())
-    })
-}
-
-/// Sets the reading of the rested sensor from now on. Returns 0, or 1 on failure.
-///
-/// # Safety
-/// `filter` is null or a filter of this library that no other thread uses.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn ohmc_filter_rest_resistance(filter: *mut Filter, measured: f64) -> c_int {
-    status(|| {
-        // SAFETY: as this function's.
-        let filter = unsafe { filter.as_mut() }.ok_or(Failure::null("filter"))?;
-        Ok(filter.rest_resistance(measured)?)
-    })
-}
-
-/// Estimates all rows of a recording from all of its readings. Returns 0, or 1 on failure.
-///
-/// # Safety
-/// `sensor` is null or a sensor of this library; the other pointers are null or have `rows` elements.
+/// `sensor` is null or a sensor of this library. The other pointers are null or have `rows` elements; `estimates` may be
+/// uninitialised and does not overlap the others.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn ohmc_smooth(
     sensor: *const Sensor,
@@ -157,21 +83,22 @@ pub unsafe extern "C" fn ohmc_smooth(
     estimates: *mut Estimate,
 ) -> c_int {
     status(|| {
-        for (name, is_null) in
-            [("time_s", time_s.is_null()), ("reading", reading.is_null()), ("estimates", estimates.is_null())]
-        {
-            if is_null {
-                return Err(Failure::null(name));
-            }
+        // SAFETY: as this function's.
+        let sensor = unsafe { sensor.as_ref() }.ok_or_else(|| Failure::null("sensor"))?;
+        if rows == 0 {
+            return Ok(());
         }
-        // SAFETY: as this function's; none is null.
-        let (sensor, time_s, reading, estimates) = unsafe {
-            let columns = (slice::from_raw_parts(time_s, rows), slice::from_raw_parts(reading, rows));
-            (sensor.as_ref(), columns.0, columns.1, slice::from_raw_parts_mut(estimates, rows))
-        };
-        let smoothed = sensor.ok_or(Failure::null("sensor"))?.smooth(time_s, reading)?;
-        for (estimate, row) in estimates.iter_mut().zip(&smoothed) {
-            *estimate = Estimate::from(row);
+        if rows > isize::MAX as usize / size_of::<Estimate>() {
+            return Err(Failure(format!("rows: expected a number that fits into memory, found {rows}")));
+        }
+        not_null(time_s, "time_s")?;
+        not_null(reading, "reading")?;
+        not_null(estimates, "estimates")?;
+        // SAFETY: as this function's; neither is null.
+        let columns = unsafe { (slice::from_raw_parts(time_s, rows), slice::from_raw_parts(reading, rows)) };
+        for (k, row) in sensor.smooth(columns.0, columns.1)?.iter().enumerate() {
+            // SAFETY: as this function's; there are as many estimates as rows.
+            unsafe { estimates.add(k).write(Estimate::from(row)) };
         }
         Ok(())
     })
@@ -182,9 +109,7 @@ pub unsafe extern "C" fn ohmc_smooth(
 /// # Safety
 /// `text` is null or ends with a zero.
 unsafe fn text<'a>(text: *const c_char, name: &str) -> Result<&'a str, Failure> {
-    if text.is_null() {
-        return Err(Failure::null(name));
-    }
+    not_null(text, name)?;
     // SAFETY: as this function's; it is not null.
     unsafe { CStr::from_ptr(text) }.to_str().map_err(|_| Failure(format!("{name}: expected text in UTF-8")))
 }

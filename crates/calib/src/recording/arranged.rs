@@ -43,7 +43,7 @@ impl<'a> Arranged<'a> {
     }
 }
 
-/// Longer recordings first; of one length by times, readings and strains.
+/// Longer recordings first; of one length by times, readings, strains and their deviations.
 fn compare(a: &Samples, b: &Samples) -> Ordering {
     let rows = |samples: &Samples| samples.time_s.len();
     rows(b)
@@ -51,6 +51,8 @@ fn compare(a: &Samples, b: &Samples) -> Ordering {
         .then_with(|| by_values(a.time_s, b.time_s))
         .then_with(|| by_values(a.reading, b.reading))
         .then_with(|| by_values(a.strain, b.strain))
+        .then_with(|| a.strain_sd.len().cmp(&b.strain_sd.len()))
+        .then_with(|| by_values(a.strain_sd, b.strain_sd))
 }
 
 fn by_values(a: &[f64], b: &[f64]) -> Ordering {
