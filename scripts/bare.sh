@@ -21,8 +21,8 @@ bare() {
     trap 'rm -rf "$root"' EXIT
     mmdebstrap --quiet --variant=minbase --include="ca-certificates,$1" "$suite" "$root" >/dev/null
     cp /etc/resolv.conf "$root/etc/resolv.conf"
-    # Where a client is configured to find its index.
-    for settings in /etc/pip.conf /root/.config/pip/pip.conf /root/.pip/pip.conf; do
+    # How this machine reaches package indices: settings, and the certificates that it trusts.
+    for settings in /etc/pip.conf /root/.config/pip/pip.conf /etc/ssl/certs/ca-certificates.crt; do
         [[ ! -e $settings ]] || install -D "$settings" "$root/$settings"
     done
     mkdir -p "$root/job"
@@ -37,7 +37,7 @@ within() {
 }
 
 passed=()
-for name in http_proxy https_proxy no_proxy HTTP_PROXY HTTPS_PROXY NO_PROXY PIP_INDEX_URL PIP_TRUSTED_HOST SSL_CERT_FILE; do
+for name in http_proxy https_proxy no_proxy HTTP_PROXY HTTPS_PROXY NO_PROXY PIP_INDEX_URL PIP_CERT PIP_TRUSTED_HOST; do
     [[ -z ${!name:-} ]] || passed+=("$name=${!name}")
 done
 
