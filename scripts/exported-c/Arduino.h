@@ -2,6 +2,7 @@
 #ifndef ARDUINO_H
 #define ARDUINO_H
 
+#include <math.h>
 #include <stdint.h>
 
 #define A0 14

@@ -165,6 +165,11 @@ struct Library;
 #[doc = include_str!("../../docs/kalman.md")]
 struct Kalman;
 
+/// The program in the README of the sensor's crate, which has no parser of files, compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../../crates/sensor/README.md")]
+struct SensorReadme;
+
 /// And the code in the architecture document.
 #[cfg(doctest)]
 #[doc = include_str!("../../ARCHITECTURE.md")]
