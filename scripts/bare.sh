@@ -28,7 +28,7 @@ bare() {
     mkdir -p "$root/job"
 }
 
-# within SECONDS-LIMIT WHAT FILE: runs job.sh in the system.
+# within LANGUAGE PACKAGE: runs job.sh in the system, and prints how long it took.
 within() {
     local start=$SECONDS
     env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LANG=C.UTF-8 "${passed[@]}" chroot "$root" /bin/bash -euo pipefail /job/job.sh
@@ -83,7 +83,10 @@ cd /job
 tar -xzf ohmstrain-c-*.tar.gz
 cd ohmstrain-c-*/examples
 gcc -std=c99 -O2 filter.c -I../include ../lib/libohmstrain_c.a -lm -lpthread -ldl -o filter
-for ((k = 0; k < 400; k++)); do printf '%d.%02d,%d\n' $((k / 20)) $((5 * (k % 20))) $((1600 + 3 * (k % 60))); done >readings.csv
+{
+    echo time_s,resistance_ohm
+    for ((k = 0; k < 400; k++)); do printf '%d.%02d,%d\n' $((k / 20)) $((5 * (k % 20))) $((1600 + 3 * (k % 60))); done
+} >readings.csv
 [[ $(./filter sensor.toml readings.csv | wc -l) -eq 401 ]]
 JOB
     within C "$(basename "$library")"

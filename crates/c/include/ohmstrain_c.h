@@ -62,7 +62,7 @@ typedef struct ohmc_estimate {
 /* Version of the library, such as "0.2.0". */
 const char *ohmc_version(void);
 
-/* What was wrong with the last call of this thread that failed; "" if none has. Valid until the next failure. */
+/* Message of the last call of this thread that failed; "" if none has. Valid until the next failure. */
 const char *ohmc_error(void);
 
 /* Reads a sensor from the text of a sensor.toml, or from a file. */
