@@ -57,6 +57,17 @@ pub fn returned<T>(call: impl FnOnce() -> Result<T, Failure>) -> *mut T {
     run(call).map_or(ptr::null_mut(), |made| Box::into_raw(Box::new(made)))
 }
 
+/// Frees what [`returned`] made; null is nothing to free.
+///
+/// # Safety
+/// `made` is null or comes from [`returned`], and is not used afterwards.
+pub unsafe fn free<T>(made: *mut T) {
+    if !made.is_null() {
+        // SAFETY: it was made by `Box::into_raw`, and belongs to the caller.
+        drop(unsafe { Box::from_raw(made) });
+    }
+}
+
 /// Runs a call; 0, or 1 on failure.
 pub fn status(call: impl FnOnce() -> Result<(), Failure>) -> c_int {
     c_int::from(run(call).is_none())

@@ -3,7 +3,7 @@ use std::ffi::c_int;
 use ohmstrain::{Filter, Sensor};
 
 use crate::Estimate;
-use crate::error::{Failure, not_null, returned, status};
+use crate::error::{Failure, free, not_null, returned, status};
 
 /// A filter as C holds it, `ohmc_filter`.
 pub struct Handle {
@@ -53,10 +53,8 @@ pub unsafe extern "C" fn ohmc_filter_new(
 /// `filter` is null or comes from this library, and is not used afterwards.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn ohmc_filter_free(filter: *mut Handle) {
-    if !filter.is_null() {
-        // SAFETY: it was made by `Box::into_raw`, and belongs to the caller.
-        drop(unsafe { Box::from_raw(filter) });
-    }
+    // SAFETY: as this function's.
+    unsafe { free(filter) }
 }
 
 /// Takes a reading, NaN for a missing one, at a time, s, after the last one. Returns 0, or 1 on failure.

@@ -17,7 +17,7 @@ use std::slice;
 use ohmstrain::Sensor;
 
 pub use error::ohmc_error;
-use error::{Failure, not_null, returned, status};
+use error::{Failure, free, not_null, returned, status};
 pub use estimate::Estimate;
 pub use filter::{
     Handle, ohmc_filter_free, ohmc_filter_know, ohmc_filter_new, ohmc_filter_rest_resistance, ohmc_filter_step,
@@ -63,10 +63,8 @@ pub unsafe extern "C" fn ohmc_sensor_from_file(path: *const c_char) -> *mut Sens
 /// `sensor` is null or comes from this library, and is not used afterwards.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn ohmc_sensor_free(sensor: *mut Sensor) {
-    if !sensor.is_null() {
-        // SAFETY: it was made by `Box::into_raw`, and belongs to the caller.
-        drop(unsafe { Box::from_raw(sensor) });
-    }
+    // SAFETY: as this function's.
+    unsafe { free(sensor) }
 }
 
 /// Estimates all rows of a recording from all of its readings. Returns 0, or 1 on failure. Without rows the pointers may be null.

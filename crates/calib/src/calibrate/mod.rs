@@ -11,6 +11,7 @@ pub(crate) mod recipe;
 pub(crate) mod scores;
 pub(crate) mod settling;
 pub(crate) mod simulated_motions;
+pub(crate) mod training_rows;
 pub(crate) mod unstated;
 pub(crate) mod with_prior;
 
@@ -180,6 +181,7 @@ pub(crate) fn calibrate_once(
     Ok(made)
 }
 
+/// Calibrates on recordings in their canonical order, which all indices of the result refer to.
 fn calibrate_arranged(
     recordings: &[Samples],
     structures: &[LawOptions],
