@@ -201,8 +201,7 @@ library() {
     fi
     packed=$(mktemp -d)
     mkdir -p "$packed/$name/lib"
-    cp -r crates/c/include crates/c/examples crates/c/README.md LICENSE-MIT LICENSE-APACHE "$packed/$name"
-    cp crates/ohmstrain/examples/sensor.toml "$packed/$name/examples"
+    cp -rL crates/c/include crates/c/examples crates/c/README.md LICENSE-MIT LICENSE-APACHE "$packed/$name"
     for file in "$built"/libohmstrain_c.{a,so,dylib}; do
         [[ ! -e $file ]] || cp "$file" "$packed/$name/lib"
     done
@@ -246,11 +245,21 @@ c() {
 
 crates() {
     cargo package --quiet --locked --workspace --exclude ohmstrain-tests
-    local crate
+    local crate clean name
+    clean=$(mktemp -d)
+    printf '[workspace]\nmembers = ["*"]\nresolver = "3"\n[patch.crates-io]\n' >"$clean/Cargo.toml"
     for crate in "${CARGO_TARGET_DIR:-target}"/package/*-"$version".crate; do
         cp "$crate" "$out"
         made "$crate"
+        tar -C "$clean" -xzf "$crate"
+        name=$(basename "$crate" ".crate")
+        echo "${name%-"$version"} = { path = \"$name\" }" >>"$clean/Cargo.toml"
     done
+    # Tests and examples, too, need nothing but what is in the packages.
+    cp Cargo.lock "$clean"
+    (cd "$clean" && CARGO_TARGET_DIR=$tools/packages cargo check --quiet --workspace --all-targets)
+    echo "tests and examples of the crates compile from what is in them"
+    rm -rf "$clean"
 }
 
 # Licences and sources of dependencies, and advisories where their list can be had; then compiles, without linking, with the

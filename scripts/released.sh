@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Writes tests/released/VERSION, once for each version that is published: a sensor, readings, its estimates and its exported filter.
+# Writes tests/released/VERSION, once for each version that is published: a sensor, readings, its estimates and its filter exported as C and as Rust.
 # Tests read, run and compile them for good.
 #
 #   released.sh
@@ -22,7 +22,9 @@ for command in filter smooth; do
     "$ohmstrain" -q "$command" "$folder/readings.csv" --sensor "$folder/sensor.toml" --columns time_s,strain,strain_sd -o "$folder/$command.csv" --force
 done
 "$ohmstrain" -q export --sensor "$folder/sensor.toml" --estimator ekf --target c --dt-s 0.1 -o c >/dev/null
-rm -rf "$folder/c"
-mkdir -p "$folder/c/src" "$folder/c/selftest"
+"$ohmstrain" -q export --sensor "$folder/sensor.toml" --estimator ekf --target rust --dt-s 0.1 -o rust >/dev/null
+rm -rf "$folder/c" "$folder/rust"
+mkdir -p "$folder/c/src" "$folder/c/selftest" "$folder/rust"
 cp c/src/ohmstrain.[ch] "$folder/c/src"
 cp c/selftest/selftest.c c/selftest/vectors.h "$folder/c/selftest"
+cp rust/sensor.rs "$folder/rust"

@@ -13,6 +13,7 @@ mod linear_oracles;
 mod long_run;
 mod mixture_smoother;
 mod mixtures;
+mod modules;
 mod naive_mixtures;
 mod one_kalman_filter;
 mod particle_oracles;
@@ -20,11 +21,9 @@ mod particles;
 mod phase_calibration;
 mod properties;
 mod published_numbers;
+mod released;
 mod representative;
 mod running_filter;
 mod sigma_points;
 mod sparse;
 mod stored;
-
-#[path = "../modules.rs"]
-mod modules;

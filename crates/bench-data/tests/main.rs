@@ -34,6 +34,3 @@ mod round_trip;
 mod segment;
 mod simulate;
 mod streaming;
-
-#[path = "../../../tests/modules.rs"]
-mod modules;

@@ -4,7 +4,7 @@ mod calls;
 mod program;
 
 /// Sensor of the examples.
-pub const SENSOR: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../ohmstrain/examples/sensor.toml");
+pub const SENSOR: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/sensor.toml");
 
 /// Rows at 20 Hz: time, s, and reading, Ω; every ninth reading is missing.
 pub fn rows() -> Vec<(f64, f64)> {

@@ -15,6 +15,3 @@ mod likelihood_sensor;
 mod marks;
 mod parameter_coverage;
 mod samples;
-
-#[path = "../../../tests/modules.rs"]
-mod modules;

@@ -44,6 +44,3 @@ mod serve;
 mod streaming;
 mod suits;
 mod validity;
-
-#[path = "../../../tests/modules.rs"]
-mod modules;

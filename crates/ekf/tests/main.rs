@@ -6,6 +6,3 @@ mod hostile;
 mod kalman;
 mod live;
 mod step;
-
-#[path = "../../../tests/modules.rs"]
-mod modules;

@@ -4,6 +4,3 @@ mod parts;
 mod response;
 mod switched;
 mod validation;
-
-#[path = "../../../tests/modules.rs"]
-mod modules;

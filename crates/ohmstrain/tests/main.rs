@@ -7,11 +7,7 @@ mod empty_rows;
 mod known;
 mod lag;
 mod motion_doubts;
-mod released;
 mod resumed;
 mod rows;
 mod surprises;
 mod threads;
-
-#[path = "../../../tests/modules.rs"]
-mod modules;

@@ -2,7 +2,7 @@ use super::*;
 use crate::samples::Samples;
 use ohmstrain_sensor::{GaugeParams, LawParams, RangeParams, SensorParams};
 
-const SENSOR: &str = include_str!("../../../../tests/fixtures/representative.toml");
+const SENSOR: &str = include_str!("../../tests/fixtures/representative.toml");
 const REST_OHM: f64 = 1700.0;
 const SPAN: f64 = 0.3;
 const RANGE: RangeParams = RangeParams { lower: 0.0, upper: SPAN };

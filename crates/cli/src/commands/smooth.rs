@@ -129,7 +129,7 @@ mod tests {
     /// Tests segments that fit in memory, and segments that do not.
     #[test]
     fn segments_come_out_in_order_of_time() {
-        let text = include_str!("../../../ohmstrain/examples/sensor.toml");
+        let text = include_str!("../../tests/fixtures/sensor.toml");
         let sensor = Sensor::from_toml(text).unwrap();
         let mut filter = sensor.filter().build().unwrap();
         let rows: Vec<Estimate> = (0..9).map(|k| filter.step(0.05 * f64::from(k), 1600.0).unwrap()).collect();

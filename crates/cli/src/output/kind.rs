@@ -269,7 +269,7 @@ mod tests {
 
     #[test]
     fn estimates_are_known_by_all_their_columns() {
-        let sensor = ohmstrain::Sensor::from_toml(include_str!("../../../ohmstrain/examples/sensor.toml")).unwrap();
+        let sensor = ohmstrain::Sensor::from_toml(include_str!("../../tests/fixtures/sensor.toml")).unwrap();
         let names: Vec<String> = sensor.columns().iter().map(|column| column.name().to_owned()).collect();
         let wrote = |head: &str, own: &[String]| Kind::Estimates.wrote(head, own);
         assert!(wrote(&names.join(","), &[]) && !wrote(&names[1..].join(","), &[]));

@@ -6,7 +6,7 @@ use ohmstrain_sensor::{EstimatorKind, SensorParams, Sessions, Unstated};
 use super::super::fixed_rate::longest_step_s;
 use super::{ChipFilter, FixedRate, Plan, Protections, StepNumbers, Task, TwinFilter, with_twin};
 
-const SENSOR: &str = include_str!("../../../../tests/fixtures/representative.toml");
+const SENSOR: &str = include_str!("../../tests/fixtures/representative.toml");
 
 /// Returns a sensor whose correction belongs to phase histories.
 fn sensor() -> Sensor {

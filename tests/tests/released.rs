@@ -1,15 +1,18 @@
-//! Sensors of released versions are read for good, and say what they said.
-
-#![cfg(feature = "calibrate")]
+//! Sensors of released versions are read for good, and give the estimates of that version; so does exported Rust with the releases that
+//! its `Cargo.toml` accepts.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use ohmstrain::{Error, Estimate, Sensor, TextCause};
 
+/// Exported Rust of 0.2.0, which asks for `ohmstrain-ekf = "0.2.0"`.
+#[path = "../released/0.2.0/rust/sensor.rs"]
+mod exported_0_2;
+
 /// Folders that `scripts/released.sh` has written. That of 0.1.0, whose files had no weights of the correction, has estimates of three rows.
 fn released() -> Vec<PathBuf> {
-    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/released");
+    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/released");
     let mut folders: Vec<PathBuf> = fs::read_dir(root).unwrap().map(|folder| folder.unwrap().path()).collect();
     folders.sort();
     folders
@@ -58,4 +61,41 @@ fn what_is_wrong_with_an_old_file_is_named() {
     assert!(named("format = 8\n").contains("missing field `made_by`"));
     let Err(Error::Text(error)) = Sensor::from_toml("format = 7\n") else { panic!("format 7 is refused") };
     assert!(matches!(error.cause, TextCause::Format { expected: 9, found: 7 }));
+}
+
+/// Number of a definition in C, such as `#define NAME 280` or `enum { NAME = 300 };`.
+fn defined(source: &str, name: &str) -> f64 {
+    let after = source.lines().find_map(|line| line.split_once(&format!(" {name} "))).unwrap().1;
+    let number: String = after.trim_start_matches("= ").chars().take_while(|c| !" }f".contains(*c)).collect();
+    number.parse().unwrap()
+}
+
+/// Reading, its deviation, strain and its deviation in the vectors of an exported self-test.
+fn vectors(source: &str) -> Vec<[f32; 4]> {
+    let row = |line: &str| {
+        let cells = line.strip_prefix("    {")?.strip_suffix("},")?.split(", ");
+        let numbers: Vec<f32> = cells.map(|cell| cell.trim_end_matches('f').parse().unwrap()).collect();
+        Some(numbers.try_into().unwrap())
+    };
+    source.lines().filter_map(row).collect()
+}
+
+/// The same sensor's C promises its own vectors to a number of ulp, whatever rounds otherwise; so must the Rust.
+#[test]
+fn exported_rust_of_a_release_passes_the_self_test_of_its_c() {
+    let vectors_h = fs::read_to_string(released()[1].join("c/selftest/vectors.h")).unwrap();
+    let tolerance = defined(&vectors_h, "VECTORS_TOLERANCE_ULP") * defined(&vectors_h, "VECTORS_ULP");
+    let (rezeroed, rested) = (defined(&vectors_h, "REZEROED"), defined(&vectors_h, "RESTED_READING"));
+    let rows = vectors(&vectors_h);
+    assert!(rows.len() as f64 == defined(&vectors_h, "VECTORS") && rows.len() > 300);
+    let mut filter = exported_0_2::filter().unwrap();
+    for (k, [reading, reading_sd, strain, strain_sd]) in rows.into_iter().enumerate() {
+        if k as f64 == rezeroed {
+            filter.rezero(rested as f32).unwrap();
+        }
+        let reading = (!reading.is_nan()).then(|| filter.relative(reading, reading_sd));
+        let now = filter.step_after(exported_0_2::DT_S, reading).unwrap();
+        let apart = f64::from((now.strain.mean - strain).abs().max((now.strain.sd() - strain_sd).abs()));
+        assert!(apart <= tolerance, "row {k}: {apart}, at most {tolerance}");
+    }
 }
