@@ -27,3 +27,4 @@ mod running_filter;
 mod sigma_points;
 mod sparse;
 mod stored;
+mod temperature;

@@ -76,6 +76,7 @@ fn sensor() -> SensorParams {
         },
         sessions: None,
         unstated: Default::default(),
+        temperature: None,
         static_cubic: StaticCubic { reading_centre: 1.0, reading_scale: 1.0, coefficients: [0.0; 4], range: limits },
         joint: None,
         law: law(&[4.0, 32.0]),

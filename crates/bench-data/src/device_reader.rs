@@ -107,6 +107,12 @@ impl<R: Read> DeviceReader<R> {
         self.parser.reading_kind().unwrap_or(ReadingKind::Ohm)
     }
 
+    /// True if rows since the last header have temperatures.
+    #[must_use]
+    pub fn has_temperature(&self) -> bool {
+        self.parser.has_temperature()
+    }
+
     /// Returns the source's metadata above the last header, with the overrides.
     #[must_use]
     pub fn metadata(&self) -> Metadata {

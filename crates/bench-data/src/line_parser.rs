@@ -87,6 +87,12 @@ impl LineParser {
         self.stream.as_ref().map(|stream| stream.parser.reading_kind())
     }
 
+    /// True if rows since the last header have temperatures.
+    #[must_use]
+    pub fn has_temperature(&self) -> bool {
+        self.stream.as_ref().is_some_and(|stream| stream.parser.has_temperature())
+    }
+
     /// True if the readings are converter codes.
     #[must_use]
     pub fn has_codes(&self) -> bool {

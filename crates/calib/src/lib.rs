@@ -34,6 +34,7 @@ mod prior;
 mod recording;
 mod samples;
 mod sd_scale;
+mod temperature;
 
 pub use baselines::{
     Baseline, Baselines, Features, Fir, LeakyBank, LowPassMode, PhaseRows, PublishedLaw, Regression, running_cubic,
@@ -60,3 +61,4 @@ pub use recording::holds::{Hold, holds};
 pub use recording::lag::{Lag, LagError, aligned, clock_lag, reference_lag};
 pub use recording::screen::{Distrusted, Doubt, Screened, screen};
 pub use samples::{Samples, SamplesError};
+pub use temperature::{Confounded, TemperatureCoefficients, TemperatureFit, fit_temperature};

@@ -105,6 +105,18 @@ impl<'a> Samples<'a> {
         Ok(Self { time_s, reading, strain, strain_sd: &[] })
     }
 
+    /// Replaces the readings.
+    ///
+    /// # Errors
+    /// If their number differs, or with the first invalid one.
+    pub fn with_readings<'b>(&self, reading: &'b [f64]) -> Result<Samples<'b>, SamplesError>
+    where
+        'a: 'b,
+    {
+        let Self { time_s, strain, strain_sd, .. } = *self;
+        Ok(Samples { strain_sd, ..Samples::new(time_s, reading, strain)? })
+    }
+
     /// Adds standard deviations of the true strains. Errors of an estimate are increased by them, so that intervals cover the reference's
     /// error as well.
     ///

@@ -1,7 +1,7 @@
 use std::cell::RefCell;
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 
-use ohmstrain::Reading;
+use ohmstrain::{Reading, Thermometer};
 use ohmstrain_bench_data::{TraceError, TraceReader};
 use tempfile::SpooledTempFile;
 
@@ -34,8 +34,8 @@ const AT_ONCE: usize = 4096;
 const NUMBER: usize = size_of::<f64>();
 
 impl StoredReadings {
-    /// Reads the remaining `rows`, at least one.
-    pub fn collect<R: Read>(mut rows: TraceReader<R>) -> Result<Self, CliError> {
+    /// Reads the remaining `rows`, at least one, as they would be at the thermometer's reference temperature.
+    pub fn collect<R: Read>(mut rows: TraceReader<R>, mut thermometer: Thermometer) -> Result<Self, CliError> {
         let has_codes = rows.has_codes();
         let mut out = BufWriter::new(tempfile::spooled_tempfile(WAIT_IN_MEMORY));
         let mut len = 0;
@@ -44,7 +44,7 @@ impl StoredReadings {
                 row.map_err(|error| late(error, "give each part a file of its own, or `filter --skip-bad` both"))?;
             let mut put = |number: f64| out.write_all(&number.to_le_bytes()).map_err(|error| temporary(&error));
             put(row.time_s)?;
-            put(row.reading.value)?;
+            put(thermometer.at_reference(row.reading.value, row.temperature_c))?;
             if has_codes {
                 put(row.reading.sd_ohm.unwrap_or(f64::NAN))?;
                 out.write_all(&[row.reading.saturated.into()]).map_err(|error| temporary(&error))?;
@@ -141,6 +141,7 @@ mod tests {
     /// is small.
     #[test]
     fn rows_come_out_as_they_went_in() {
+        let sensor = ohmstrain::Sensor::from_toml(include_str!("../tests/fixtures/sensor.toml")).unwrap();
         for rows in [10, WAIT_IN_MEMORY / (2 * NUMBER) + 5000] {
             let mut text = String::from("time_s,resistance_ohm\n");
             let value = |row: usize| if row % 7 == 3 { None } else { Some(1000 + row % 911) };
@@ -148,7 +149,8 @@ mod tests {
                 let cell = value(row).map_or_else(String::new, |value| value.to_string());
                 writeln!(text, "{row},{cell}").unwrap();
             }
-            let readings = StoredReadings::collect(TraceReader::new(text.as_bytes(), "t.csv").unwrap()).unwrap();
+            let written = TraceReader::new(text.as_bytes(), "t.csv").unwrap();
+            let readings = StoredReadings::collect(written, Thermometer::new(&sensor)).unwrap();
             assert_eq!(readings.len(), rows);
             assert_eq!(readings.kept.borrow().file.is_rolled(), rows > 10);
             let backwards = (0..rows.div_ceil(AT_ONCE)).rev().flat_map(|at| at * AT_ONCE..rows.min((at + 1) * AT_ONCE));

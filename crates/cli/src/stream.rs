@@ -2,6 +2,7 @@
 
 use std::io::Read;
 
+use ohmstrain::{Sensor, Thermometer};
 use ohmstrain_bench_data::{DeviceReader, DeviceRow, LastTime, Metadata, ReadingKind, TraceError, TraceReader};
 
 use crate::args::FilterArgs;
@@ -11,7 +12,13 @@ use crate::input;
 type Source = Box<dyn Read>;
 
 /// Rows of a recording or of a device.
-pub enum RowSource {
+pub struct RowSource {
+    rows: Rows,
+    /// Conversion of readings, once the sensor is known.
+    thermometer: Option<Thermometer>,
+}
+
+enum Rows {
     Recording(Box<TraceReader<Source>>),
     Device(Box<DeviceReader<Source>>),
 }
@@ -20,18 +27,19 @@ pub enum RowSource {
 pub fn open(args: &FilterArgs) -> Result<RowSource, CliError> {
     let (text, metadata) = input::text_of(&args.trace_file, &args.setup.metadata(&args.estimate.units))?;
     let name = args.trace_file.display().to_string();
-    let recording = |reader| RowSource::Recording(Box::new(reader));
-    let device = |reader| RowSource::Device(Box::new(reader));
-    match (&args.header, args.skip_bad) {
-        (None, false) => Ok(recording(TraceReader::with_overrides(text, &name, &metadata)?)),
-        (None, true) => DeviceReader::new(text, &name, &metadata).map(device).map_err(without_header),
+    let recording = |reader| Rows::Recording(Box::new(reader));
+    let device = |reader| Rows::Device(Box::new(reader));
+    let rows = match (&args.header, args.skip_bad) {
+        (None, false) => recording(TraceReader::with_overrides(text, &name, &metadata)?),
+        (None, true) => DeviceReader::new(text, &name, &metadata).map(device).map_err(without_header)?,
         (Some(header), false) => {
-            TraceReader::headless(text, &name, header, &metadata).map(recording).map_err(of_header_flag)
+            TraceReader::headless(text, &name, header, &metadata).map(recording).map_err(of_header_flag)?
         }
         (Some(header), true) => {
-            DeviceReader::headless(text, &name, header, &metadata).map(device).map_err(of_header_flag)
+            DeviceReader::headless(text, &name, header, &metadata).map(device).map_err(of_header_flag)?
         }
-    }
+    };
+    Ok(RowSource { rows, thermometer: None })
 }
 
 /// Creates the error of a stream whose header did not arrive.
@@ -56,51 +64,64 @@ fn of_header_flag(error: TraceError) -> CliError {
 }
 
 impl RowSource {
+    /// Converts all further readings to the reference temperature of a sensor.
+    pub fn convert_for(&mut self, sensor: &Sensor) {
+        self.thermometer = Some(Thermometer::new(sensor));
+    }
+
+    /// True if the rows have temperatures.
+    pub fn has_temperature(&self) -> bool {
+        match &self.rows {
+            Rows::Recording(rows) => rows.has_temperature(),
+            Rows::Device(rows) => rows.has_temperature(),
+        }
+    }
+
     /// Returns the name of the source in messages.
     pub fn file(&self) -> &str {
-        match self {
-            Self::Recording(rows) => rows.file(),
-            Self::Device(rows) => rows.file(),
+        match &self.rows {
+            Rows::Recording(rows) => rows.file(),
+            Rows::Device(rows) => rows.file(),
         }
     }
 
     /// Returns the number of the physical line read last, counted from 1.
     pub fn line(&self) -> u64 {
-        match self {
-            Self::Recording(rows) => rows.line(),
-            Self::Device(rows) => rows.line(),
+        match &self.rows {
+            Rows::Recording(rows) => rows.line(),
+            Rows::Device(rows) => rows.line(),
         }
     }
 
     /// Returns the time of the last row, as it was written.
     pub fn last_time(&self) -> Option<LastTime> {
-        match self {
-            Self::Recording(rows) => rows.last_time(),
-            Self::Device(rows) => rows.last_time(),
+        match &self.rows {
+            Rows::Recording(rows) => rows.last_time(),
+            Rows::Device(rows) => rows.last_time(),
         }
     }
 
     /// Continues from the last time of the previous stream; returns `false` if that used another unit.
     pub fn go_on(&mut self, from: LastTime) -> bool {
-        match self {
-            Self::Recording(rows) => rows.go_on(from),
-            Self::Device(rows) => rows.go_on(from),
+        match &mut self.rows {
+            Rows::Recording(rows) => rows.go_on(from),
+            Rows::Device(rows) => rows.go_on(from),
         }
     }
 
     /// Returns the kind of the readings.
     pub fn reading_kind(&self) -> ReadingKind {
-        match self {
-            Self::Recording(rows) => rows.reading_kind(),
-            Self::Device(rows) => rows.reading_kind(),
+        match &self.rows {
+            Rows::Recording(rows) => rows.reading_kind(),
+            Rows::Device(rows) => rows.reading_kind(),
         }
     }
 
     /// Returns the metadata of the source.
     pub fn metadata(&self) -> Metadata {
-        match self {
-            Self::Recording(rows) => rows.metadata().clone(),
-            Self::Device(rows) => rows.metadata(),
+        match &self.rows {
+            Rows::Recording(rows) => rows.metadata().clone(),
+            Rows::Device(rows) => rows.metadata(),
         }
     }
 }
@@ -109,9 +130,13 @@ impl Iterator for RowSource {
     type Item = Result<DeviceRow, TraceError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        match self {
-            Self::Recording(rows) => Some(rows.next()?.map(|row| DeviceRow { row, restarted: false })),
-            Self::Device(rows) => rows.next(),
+        let mut row = match &mut self.rows {
+            Rows::Recording(rows) => rows.next()?.map(|row| DeviceRow { row, restarted: false }),
+            Rows::Device(rows) => rows.next()?,
+        };
+        if let (Ok(DeviceRow { row, .. }), Some(thermometer)) = (&mut row, &mut self.thermometer) {
+            row.reading.value = thermometer.at_reference(row.reading.value, row.temperature_c);
         }
+        Some(row)
     }
 }

@@ -1,6 +1,7 @@
 //! Doubts about a sensor's input: some are refused, others warned of.
 
 use ohmstrain::Interface::CommandLine;
+use ohmstrain::number::significant;
 use ohmstrain::trace::TraceFile;
 use ohmstrain::{Known, ReferenceDoubt, Sensor, UnitDoubt, unused_known};
 
@@ -28,6 +29,16 @@ pub fn check_reference(recording: &TraceFile, sensor: &Sensor) -> Result<(), Cli
     let truth = (0..recording.trace.len()).map(|row| recording.truth(row));
     let refused = |doubt: ReferenceDoubt| CliError::Input(format!("{}: {}", recording.header, doubt.text(CommandLine)));
     sensor.check_reference(truth).map_err(refused)
+}
+
+/// Returns the sensor for readings with or without temperatures; warns where intervals are wider without.
+pub fn sensor_for(sensor: Sensor, has_temperature: bool, file: &str, messages: &Messages) -> Sensor {
+    let Some(effect) = sensor.params().temperature.filter(|_| !has_temperature) else { return sensor };
+    let (lower, upper) = (significant(effect.lower_c, 3), significant(effect.upper_c, 3));
+    messages.warning(&format!(
+        "{file}: no column `temperature_c`: intervals are wider by what {lower} to {upper} °C do to the strain, as in the calibration"
+    ));
+    sensor.without_temperature()
 }
 
 /// Warns of an initial strain that the sensor never reports.

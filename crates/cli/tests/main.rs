@@ -43,4 +43,5 @@ mod serial_check;
 mod serve;
 mod streaming;
 mod suits;
+mod temperature;
 mod validity;

@@ -1,7 +1,8 @@
 use std::mem;
 
 use ohmstrain_calib::{
-    CalibrationError, Distrusted, GaugeFamily, LawOptions, LeftOutRow, RECIPE, Samples, Stage, calibrate_with_prior,
+    CalibrationError, Confounded, Distrusted, GaugeFamily, LawOptions, LeftOutRow, RECIPE, Samples, Stage,
+    TemperatureCoefficients, TemperatureFit, calibrate_with_prior, fit_temperature,
 };
 use ohmstrain_sensor::{EstimatorKind, Findings, RecordingInfo, SensorParams};
 
@@ -48,6 +49,7 @@ pub struct Calibration<'a> {
     estimator: Option<EstimatorKind>,
     branches: Option<usize>,
     gauge: Option<GaugeFamily>,
+    temperature: Option<TemperatureCoefficients>,
 }
 
 /// Result of a calibration.
@@ -70,6 +72,8 @@ pub struct Calibrated {
     pub rest_readings: Vec<f64>,
     /// Rows that were left out.
     pub distrusted: Vec<Distrusted>,
+    /// Reason why the effect of temperature could not be determined although the temperature moved; `None` otherwise.
+    pub confounded_temperature: Option<Confounded>,
     /// Estimates on each quarter by a fit to the other quarters, in order; empty if that was not possible.
     pub left_out: Vec<LeftOutRow>,
 }
@@ -82,7 +86,7 @@ impl<'a> Calibration<'a> {
     /// ```
     #[must_use]
     pub const fn new() -> Self {
-        Self { prior: None, estimator: None, branches: None, gauge: None }
+        Self { prior: None, estimator: None, branches: None, gauge: None, temperature: None }
     }
 
     /// Sets the estimator that is calibrated and becomes the sensor's default; the extended Kalman filter is calibrated in any
@@ -118,6 +122,19 @@ impl<'a> Calibration<'a> {
     #[must_use]
     pub const fn gauge(self, family: GaugeFamily) -> Self {
         Self { gauge: Some(family), ..self }
+    }
+
+    /// Sets the effect of temperature instead of fitting it, for recordings with temperatures.
+    ///
+    /// ```
+    /// use ohmstrain::{Calibration, TemperatureCoefficients};
+    ///
+    /// let coefficients = TemperatureCoefficients { rest_per_k: (0.003, 0.0005), gain_per_k: (0.0, 0.001) };
+    /// let calibration = Calibration::new().temperature(coefficients);
+    /// ```
+    #[must_use]
+    pub const fn temperature(self, coefficients: TemperatureCoefficients) -> Self {
+        Self { temperature: Some(coefficients), ..self }
     }
 
     /// Uses a prior learned from other sensors of the same make, with which a short motion is enough. The law's structure is
@@ -172,7 +189,14 @@ impl<'a> Calibration<'a> {
             return Err(Error::OtherQuantity);
         }
         let estimator = self.estimator.unwrap_or(RECIPE.estimator);
-        let samples: Vec<Samples> = recordings.iter().map(|recording| recording.samples).collect();
+        let as_recorded: Vec<Samples> = recordings.iter().map(|recording| recording.samples).collect();
+        let temperature = self.effect_of_temperature(recordings, &as_recorded)?;
+        let mut samples: Vec<Samples> = as_recorded;
+        if let Some(fit) = &temperature {
+            for (samples, readings) in samples.iter_mut().zip(&fit.readings) {
+                *samples = samples.with_readings(readings)?;
+            }
+        }
         let prior = self.prior.map(Prior::params);
         if let Some(of_make) = prior.map(|prior| prior.quantity).filter(|of_make| *of_make != quantity) {
             return Err(Error::OtherMake { of_make, found: quantity });
@@ -191,8 +215,21 @@ impl<'a> Calibration<'a> {
         let infos = recordings.iter().zip(&rest_readings).filter_map(info).collect();
         let joint = recordings.iter().find_map(|recording| recording.joint);
         let params = calibration.into_sensor(MADE_BY, quantity, reading);
-        let sensor = Sensor::from_params(SensorParams { joint, recordings: infos, ..params })?;
-        Ok(Calibrated { sensor, findings, rest_readings, distrusted, left_out })
+        let (effect, confounded_temperature) =
+            temperature.as_ref().map_or((None, None), |fit| (fit.effect, fit.confounded));
+        let sensor = Sensor::from_params(SensorParams { joint, recordings: infos, temperature: effect, ..params })?;
+        Ok(Calibrated { sensor, findings, rest_readings, distrusted, confounded_temperature, left_out })
+    }
+
+    /// Returns the effect of temperature, with readings at the reference temperature; `None` unless all recordings have temperatures.
+    fn effect_of_temperature(
+        self,
+        recordings: &[Recording],
+        samples: &[Samples],
+    ) -> Result<Option<TemperatureFit>, Error> {
+        let temperature_c: Option<Vec<&[f64]>> = recordings.iter().map(|recording| recording.temperature_c).collect();
+        let fit = temperature_c.map(|temperature_c| fit_temperature(samples, &temperature_c, self.temperature));
+        Ok(fit.transpose()?)
     }
 
     /// Returns the candidate structures of the law.

@@ -105,6 +105,13 @@ pub enum CalibrationDoubt {
         /// Duration of a stroke by this clock, s.
         stroke_s: f64,
     },
+    /// A temperature whose effect cannot be told from relaxation, drift or strain.
+    Temperature {
+        /// Range of the temperatures, K.
+        range_k: f64,
+        /// Fitted relative change of R₀ per kelvin, with its standard deviation.
+        rest_per_k: (f64, f64),
+    },
     /// Intervals that were widened because the law is too wrong.
     Widened {
         /// Name of the quantity of the intervals.
@@ -130,7 +137,11 @@ impl CalibrationDoubt {
             | Self::Turned { .. }
             | Self::TurnedApart { .. }
             | Self::Milliseconds { .. } => true,
-            Self::GaugesApart { .. } | Self::Copy { .. } | Self::RestsApart { .. } | Self::Widened { .. } => false,
+            Self::GaugesApart { .. }
+            | Self::Copy { .. }
+            | Self::RestsApart { .. }
+            | Self::Temperature { .. }
+            | Self::Widened { .. } => false,
         }
     }
 
@@ -154,7 +165,7 @@ impl CalibrationDoubt {
             | Self::TurnedApart { recordings }
             | Self::Copy { recordings }
             | Self::RestsApart { recordings, .. } => recordings.to_vec(),
-            Self::Widened { .. } => vec![],
+            Self::Temperature { .. } | Self::Widened { .. } => vec![],
         }
     }
 }

@@ -103,6 +103,15 @@ pub enum Error {
         /// Number of readings.
         readings: usize,
     },
+    /// Temperatures that do not belong to the rows.
+    #[cfg(feature = "calibrate")]
+    #[error("{rows} rows and {temperatures} temperatures; expected as many of each")]
+    Temperatures {
+        /// Number of rows.
+        rows: usize,
+        /// Number of temperatures.
+        temperatures: usize,
+    },
     /// Slices that do not form a valid recording.
     #[cfg(feature = "calibrate")]
     #[error(transparent)]

@@ -60,6 +60,7 @@ mod sensor;
 mod sentences;
 mod smoothing;
 mod stored;
+mod temperature;
 #[cfg(feature = "calibrate")]
 mod tested;
 mod text;
@@ -104,6 +105,7 @@ pub use sensor::Sensor;
 pub use sentences::LagAnswer;
 pub use sentences::{Closing, Interface, Tested, number, verdict};
 pub use stored::{Stored, StoredClock, StoredError};
+pub use temperature::Thermometer;
 #[cfg(feature = "calibrate")]
 pub use tested::Kept;
 pub use unit_doubt::{UnitDoubt, UnitGuess};
@@ -112,8 +114,8 @@ pub use validity::{Beyond, Extrapolation, ValiditySeen, ValidityWatch};
 #[cfg(feature = "calibrate")]
 #[doc(no_inline)]
 pub use ohmstrain_calib::{
-    CalibrationError, Distrusted, Doubt, GaugeFamily, Identifiability, Lag, LagError, LeftOutRow, Mark,
-    MarkedReference, MarksError, SamplesError, ScoredRow, Stage, score,
+    CalibrationError, Confounded, Distrusted, Doubt, GaugeFamily, Identifiability, Lag, LagError, LeftOutRow, Mark,
+    MarkedReference, MarksError, SamplesError, ScoredRow, Stage, TemperatureCoefficients, score,
 };
 pub use ohmstrain_ekf::live::{FARTHEST_REST, Flag, Flags, KNOWN_BEYOND};
 #[doc(no_inline)]
@@ -125,6 +127,7 @@ pub use ohmstrain_sensor::fusion::{FusionParams, FusionRow, RegressionParams};
 #[doc(no_inline)]
 pub use ohmstrain_sensor::{
     EstimatorKind, FieldError, Findings, JointParams, Quantity, ReadingUnit, Scores, SensorError, SensorParams,
+    TemperatureParams,
 };
 
 /// Name and version of the program, as written into files.

@@ -1,3 +1,4 @@
+use ohmstrain_calib::Confounded;
 use ohmstrain_sensor::{Quantity, ReadingUnit, SensorParams};
 
 use crate::unit_doubt::LEAST_OHM;
@@ -147,6 +148,10 @@ impl Calibrated {
         let rests =
             farthest(&rests, REST_RATIO).map(|(recordings, rests)| CalibrationDoubt::RestsApart { recordings, rests });
         let params: &SensorParams = self.sensor.params();
-        rests.into_iter().chain(params.widened_most().into_iter().map(|of| CalibrationDoubt::Widened { of })).collect()
+        let temperature = self.confounded_temperature.map(|Confounded { range_k, coefficients, .. }| {
+            CalibrationDoubt::Temperature { range_k, rest_per_k: coefficients.rest_per_k }
+        });
+        let widened = params.widened_most().into_iter().map(|of| CalibrationDoubt::Widened { of });
+        rests.into_iter().chain(temperature).chain(widened).collect()
     }
 }

@@ -1,7 +1,7 @@
 use ohmstrain_calib::{Samples, ScoredRow};
 use ohmstrain_sensor::{JointParams, Quantity, ReadingUnit, Scores};
 
-use crate::{Error, Sensor};
+use crate::{Error, Sensor, Thermometer};
 
 /// A recording with known strain, for calibration or comparison.
 ///
@@ -19,6 +19,7 @@ pub struct Recording<'a> {
     pub(crate) quantity: Quantity,
     pub(crate) joint: Option<JointParams>,
     pub(crate) file: Option<(&'a str, &'a str)>,
+    pub(crate) temperature_c: Option<&'a [f64]>,
     pub(crate) knows_strain_unit: bool,
     pub(crate) knows_resistance_unit: bool,
     pub(crate) knows_clock: bool,
@@ -44,6 +45,7 @@ impl<'a> Recording<'a> {
             quantity: Quantity::Strain,
             joint: None,
             file: None,
+            temperature_c: None,
             knows_strain_unit: false,
             knows_resistance_unit: false,
             knows_clock: false,
@@ -64,6 +66,33 @@ impl<'a> Recording<'a> {
     /// ```
     pub fn with_strain_sd(self, strain_sd: &'a [f64]) -> Result<Self, Error> {
         Ok(Self { samples: self.samples.with_strain_sd(strain_sd)?, ..self })
+    }
+
+    /// Sets the temperature in each row, °C, NaN where it was not measured. Calibration determines its effect if it moves enough.
+    ///
+    /// # Errors
+    /// If their number differs from that of the rows.
+    ///
+    /// ```
+    /// let recording = ohmstrain::Recording::new(&[0.0, 0.1], &[1600.0, 1610.0], &[0.00, 0.01])?;
+    /// assert!(recording.at_temperatures_c(&[21.5, f64::NAN]).is_ok());
+    /// assert!(recording.at_temperatures_c(&[21.5]).is_err());
+    /// # Ok::<(), ohmstrain::Error>(())
+    /// ```
+    pub fn at_temperatures_c(self, temperature_c: &'a [f64]) -> Result<Self, Error> {
+        let (rows, temperatures) = (self.samples.len(), temperature_c.len());
+        if rows != temperatures {
+            return Err(Error::Temperatures { rows, temperatures });
+        }
+        Ok(Self { temperature_c: Some(temperature_c), ..self })
+    }
+
+    /// Returns the readings at the reference temperature of a sensor.
+    fn readings_for(&self, sensor: &Sensor) -> Vec<f64> {
+        let mut thermometer = Thermometer::new(sensor);
+        let temperature_c = |row: usize| self.temperature_c.map_or(f64::NAN, |values| values[row]);
+        let readings = self.samples.reading().iter().enumerate();
+        readings.map(|(row, reading)| thermometer.at_reference(*reading, temperature_c(row))).collect()
     }
 
     /// States that the readings are ratios to some resistance at rest.
@@ -195,9 +224,10 @@ impl Sensor {
             return Err(Error::OtherQuantity);
         }
         self.check_reference(samples.strain().iter().copied())?;
-        let (time_s, readings) = (samples.time_s(), samples.reading());
-        let smoothed = self.smooth(time_s, readings)?;
-        let mut filter = self.filter().build()?;
+        let (time_s, readings) = (samples.time_s(), recording.readings_for(self));
+        let sensor = if recording.temperature_c.is_some() { self } else { &self.clone().without_temperature() };
+        let smoothed = sensor.smooth(time_s, &readings)?;
+        let mut filter = sensor.filter().build()?;
         let mut cubic = ohmstrain_calib::running_cubic(params.static_cubic);
         let (mut filter_rows, mut smoother_rows, mut cubic_rows) = (Vec::new(), Vec::new(), Vec::new());
         for (row, smoothed) in smoothed.iter().enumerate() {

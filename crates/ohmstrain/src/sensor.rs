@@ -93,6 +93,11 @@ impl Sensor {
         Ok(sensor)
     }
 
+    /// Returns the sensor with other parameters that its learned correction does not depend on.
+    pub(crate) fn with_params(self, params: Arc<SensorParams>) -> Self {
+        Self { params, ..self }
+    }
+
     /// Builds a filter that shares the learned correction.
     pub(crate) fn build(
         &self,

@@ -1,6 +1,8 @@
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
-use ohmstrain::{Calibrated, Calibration, Error, GaugeFamily, Prior, calibration_doubts, motion_doubts};
+use ohmstrain::{
+    Calibrated, Calibration, Error, GaugeFamily, Prior, TemperatureCoefficients, calibration_doubts, motion_doubts,
+};
 use ohmstrain_calib::{Samples, screen};
 use pyo3::prelude::*;
 use pyo3_arrow::PyTable;
@@ -24,6 +26,8 @@ pub struct Choices {
     prior: Option<String>,
     /// True if a late reference is moved.
     align: bool,
+    /// Coefficients of temperature with their standard deviations: R₀'s and the gain's.
+    temperature: Option<((f64, f64), (f64, f64))>,
 }
 
 impl Choices {
@@ -35,6 +39,9 @@ impl Choices {
         let mut calibration = Calibration::new();
         if let Some(prior) = prior {
             calibration = calibration.prior(prior);
+        }
+        if let Some((rest_per_k, gain_per_k)) = self.temperature {
+            calibration = calibration.temperature(TemperatureCoefficients { rest_per_k, gain_per_k });
         }
         if let Some(kind) = self.estimator.as_deref().map(estimator).transpose()?.flatten() {
             calibration = calibration.estimator(kind);
@@ -159,7 +166,8 @@ pub fn evaluate_split(
     let rows = (recording.time_s.len() as f64 * share) as usize;
     let recordings = [recording];
     let (sensor, warnings) = calibrated(py, &recordings, &[rows], choices.calibration(None)?)?;
-    let [recording] = &recordings;
-    let scored = after_split(py, recording, rows, &sensor.sensor)?;
+    let [mut recording] = recordings;
+    let suited = recording.convert_for(&sensor.sensor);
+    let scored = after_split(py, &recording, rows, &suited)?;
     Ok((sensor, warnings, scored))
 }

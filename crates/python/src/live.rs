@@ -1,6 +1,6 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use ohmstrain::{Column, Error, Estimate, Known, Stored};
+use ohmstrain::{Column, Error, Estimate, Known, Stored, Thermometer};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 use pyo3::types::PyDict;
@@ -26,6 +26,7 @@ pub struct LiveFilter {
 
 struct Running {
     filter: ohmstrain::Filter,
+    thermometer: Thermometer,
     watch: Watch,
     /// Reading of the rested sensor, if it differs from that in calibration.
     rest_resistance: Option<f64>,
@@ -34,7 +35,7 @@ struct Running {
 /// A running fixed-lag filter.
 #[pyclass(frozen, module = "ohmstrain._core")]
 pub struct LaggedFilter {
-    filter: Mutex<ohmstrain::LaggedFilter>,
+    filter: Mutex<(ohmstrain::LaggedFilter, Thermometer)>,
     columns: Vec<Column>,
 }
 
@@ -46,6 +47,11 @@ fn locked<'a, T>(filter: &'a Mutex<T>, py: Python) -> MutexGuard<'a, T> {
 
 fn refused(error: Error) -> PyErr {
     of_library(&error, None)
+}
+
+/// Converts a reading to the reference temperature.
+fn at_reference(thermometer: &mut Thermometer, reading: Option<f64>, temperature_c: Option<f64>) -> Option<f64> {
+    reading.map(|reading| thermometer.at_reference(reading, temperature_c.unwrap_or(f64::NAN)))
 }
 
 /// Converts a row to a dictionary with the names of the columns; `None` for unknown values.
@@ -99,7 +105,7 @@ impl LiveFilter {
         rest_resistance: Option<f64>,
         known: Vec<Known>,
     ) -> Self {
-        let running = Mutex::new(Running { filter, watch, rest_resistance });
+        let running = Mutex::new(Running { filter, thermometer: Thermometer::new(&sensor), watch, rest_resistance });
         Self { running, sensor, columns, known, zero_ns: None }
     }
 }
@@ -110,24 +116,33 @@ pub fn stored(text: &str, file: Option<&str>) -> PyResult<Stored> {
 }
 
 impl LaggedFilter {
-    pub(crate) fn new(filter: ohmstrain::LaggedFilter, columns: Vec<Column>) -> Self {
-        Self { filter: Mutex::new(filter), columns }
+    pub(crate) fn new(filter: ohmstrain::LaggedFilter, sensor: &ohmstrain::Sensor, columns: Vec<Column>) -> Self {
+        Self { filter: Mutex::new((filter, Thermometer::new(sensor))), columns }
     }
 }
 
 #[pymethods]
 impl LiveFilter {
-    #[pyo3(signature = (time_s, reading=None))]
-    fn step<'py>(&self, py: Python<'py>, time_s: f64, reading: Option<f64>) -> PyResult<Bound<'py, PyDict>> {
-        let estimate = locked(&self.running, py).filter.step(time_s, reading).map_err(refused)?;
+    #[pyo3(signature = (time_s, reading=None, temperature_c=None))]
+    fn step<'py>(
+        &self,
+        py: Python<'py>,
+        time_s: f64,
+        reading: Option<f64>,
+        temperature_c: Option<f64>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let mut running = locked(&self.running, py);
+        let Running { filter, thermometer, .. } = &mut *running;
+        let estimate = filter.step(time_s, at_reference(thermometer, reading, temperature_c)).map_err(refused)?;
         row(py, &self.columns, &estimate)
     }
 
     /// Takes the rows of a table; the next call continues after the last one.
     fn run(&self, py: Python, table: PyTable, about: About) -> PyResult<Doubtful> {
-        let recording = Recording::new(table, about)?;
+        let mut recording = Recording::new(table, about)?;
+        recording.convert_for(&self.sensor);
         let mut running = locked(&self.running, py);
-        let Running { filter, watch, rest_resistance } = &mut *running;
+        let Running { filter, watch, rest_resistance, .. } = &mut *running;
         recording.check_unit(&self.sensor, *rest_resistance)?;
         let mut estimates = Estimates::new(self.columns.clone(), recording.time_s.len());
         py.detach(|| {
@@ -162,25 +177,32 @@ impl LiveFilter {
 
 #[pymethods]
 impl LaggedFilter {
-    #[pyo3(signature = (time_s, reading=None))]
-    fn step<'py>(&self, py: Python<'py>, time_s: f64, reading: Option<f64>) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        let mut filter = locked(&self.filter, py);
-        let rows = filter.step(time_s, reading).map_err(refused)?;
+    #[pyo3(signature = (time_s, reading=None, temperature_c=None))]
+    fn step<'py>(
+        &self,
+        py: Python<'py>,
+        time_s: f64,
+        reading: Option<f64>,
+        temperature_c: Option<f64>,
+    ) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let mut guard = locked(&self.filter, py);
+        let (filter, thermometer) = &mut *guard;
+        let rows = filter.step(time_s, at_reference(thermometer, reading, temperature_c)).map_err(refused)?;
         rows.iter().map(|estimate| row(py, &self.columns, estimate)).collect()
     }
 
     fn finish<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let mut filter = locked(&self.filter, py);
-        let rows = filter.finish().map_err(refused)?;
+        let rows = filter.0.finish().map_err(refused)?;
         rows.iter().map(|estimate| row(py, &self.columns, estimate)).collect()
     }
 
     /// Stores everything that the next row depends on, as TOML.
     fn store(&self, py: Python) -> PyResult<String> {
-        locked(&self.filter, py).store().and_then(|stored| stored.to_toml()).map_err(refused)
+        locked(&self.filter, py).0.store().and_then(|stored| stored.to_toml()).map_err(refused)
     }
 
     fn rest_resistance(&self, py: Python, measured: f64) -> PyResult<()> {
-        locked(&self.filter, py).rest_resistance(measured).map_err(refused)
+        locked(&self.filter, py).0.rest_resistance(measured).map_err(refused)
     }
 }

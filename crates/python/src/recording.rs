@@ -8,7 +8,9 @@ use arrow_array::types::Float64Type;
 use arrow_array::{Array, RecordBatch};
 use arrow_cast::cast;
 use arrow_schema::{ArrowError, DataType, Schema};
-use ohmstrain::{Error, Estimate, Filter, FilterBuilder, JointParams, Quantity, Reading, ReadingUnit, Sensor};
+use ohmstrain::{
+    Error, Estimate, Filter, FilterBuilder, JointParams, Quantity, Reading, ReadingUnit, Sensor, Thermometer,
+};
 use ohmstrain_calib::Samples;
 use pyo3::prelude::*;
 use pyo3_arrow::PyTable;
@@ -29,6 +31,8 @@ pub struct Recording {
     converter: Option<Vec<(f64, bool)>>,
     /// Unit of the readings.
     pub unit: ReadingUnit,
+    /// Temperatures, °C, if the table has them.
+    temperature_c: Option<Vec<f64>>,
     /// Quantity and values of the reference.
     pub reference: Option<(Quantity, Vec<f64>)>,
     /// The joint that the sensor is mounted on.
@@ -42,9 +46,10 @@ pub struct Recording {
 /// Number of rows between checks for an interrupt.
 const ROWS_PER_CHECK: usize = 4096;
 
-/// Groups of columns: a table has exactly one of each of the first two groups, and at most one of the third.
+/// Groups of columns: a table has exactly one of each of the first two groups, and at most one of the others.
 const TIMES: [&str; 2] = ["time_s", "time_us"];
 const READINGS: [&str; 3] = ["resistance_ohm", "resistance_ratio", "adc"];
+const TEMPERATURES: [&str; 1] = ["temperature_c"];
 const REFERENCES: [&str; 3] = ["strain", "displacement_mm", "angle_deg"];
 
 impl Recording {
@@ -70,6 +75,7 @@ impl Recording {
         }
         check_times(&time_s, time, file)?;
         let (readings, converter) = about.readings(reading, column(reading)?)?;
+        let temperature_c = one_of(&schema, &TEMPERATURES, file)?.map(column).transpose()?;
         let joint_spec = about.joint_spec()?;
         let reference = match reference {
             Some(name) => Some(about.reference(name, column(name)?, joint_spec.as_ref())?),
@@ -88,6 +94,7 @@ impl Recording {
             readings,
             converter,
             unit,
+            temperature_c,
             reference,
             joint,
             knows_strain_unit,
@@ -112,9 +119,23 @@ impl Recording {
         (&self.time_s[..rows], &self.readings[..rows], reference)
     }
 
+    /// Converts its readings to the reference temperature of a sensor; returns the sensor for it, with wider intervals if it has no
+    /// temperatures.
+    pub fn convert_for(&mut self, sensor: &Sensor) -> Sensor {
+        let Some(temperature_c) = &self.temperature_c else { return sensor.clone().without_temperature() };
+        let mut thermometer = Thermometer::new(sensor);
+        for (reading, temperature_c) in self.readings.iter_mut().zip(temperature_c) {
+            *reading = thermometer.at_reference(*reading, *temperature_c);
+        }
+        sensor.clone()
+    }
+
     /// Returns samples of it in the form that the library calibrates on.
-    pub fn known<'a>(&self, samples: &Samples<'a>) -> Result<ohmstrain::Recording<'a>, Error> {
+    pub fn known<'a>(&'a self, samples: &Samples<'a>) -> Result<ohmstrain::Recording<'a>, Error> {
         let mut one = ohmstrain::Recording::new(samples.time_s(), samples.reading(), samples.strain())?;
+        if let Some(temperature_c) = &self.temperature_c {
+            one = one.at_temperatures_c(&temperature_c[..samples.len()])?;
+        }
         if self.unit == ReadingUnit::Ratio {
             one = one.of_ratios();
         }

@@ -1,5 +1,3 @@
-use std::borrow::Cow;
-
 use ohmstrain::{Closing, EstimatorKind, JointParams, Quantity, ReadingUnit};
 use pyo3::prelude::*;
 use pyo3_arrow::PyTable;
@@ -22,20 +20,29 @@ pub struct Sensor {
 }
 
 impl Sensor {
-    /// Returns the sensor on the joint of a recording, if it has one, after a check of the readings.
-    fn for_recording(&self, recording: &Recording, options: &Options) -> PyResult<Cow<'_, ohmstrain::Sensor>> {
-        recording.check_unit(&self.sensor, options.rest_resistance(&self.sensor)?)?;
-        self.on_joint(recording.joint, recording.name.as_deref())
+    /// Converts the readings of a recording to the sensor's reference temperature and checks them; returns the sensor on its joint, if it
+    /// has one.
+    fn for_recording(&self, recording: &mut Recording, options: &Options) -> PyResult<ohmstrain::Sensor> {
+        let sensor = recording.convert_for(&self.sensor);
+        recording.check_unit(&sensor, options.rest_resistance(&sensor)?)?;
+        on_joint(sensor, recording.joint, recording.name.as_deref())
     }
+}
 
-    fn on_joint(&self, joint: Option<JointParams>, file: Option<&str>) -> PyResult<Cow<'_, ohmstrain::Sensor>> {
-        let Some(joint) = joint else { return Ok(Cow::Borrowed(&self.sensor)) };
-        self.sensor.clone().on_joint(joint).map(Cow::Owned).map_err(|error| of_library(&error, file))
+fn on_joint(sensor: ohmstrain::Sensor, joint: Option<JointParams>, file: Option<&str>) -> PyResult<ohmstrain::Sensor> {
+    match joint {
+        None => Ok(sensor),
+        Some(joint) => sensor.on_joint(joint).map_err(|error| of_library(&error, file)),
     }
 }
 
 #[pymethods]
 impl Sensor {
+    /// Returns the sensor for readings whose temperature is not measured.
+    fn without_temperature(&self) -> Self {
+        Self { sensor: self.sensor.clone().without_temperature() }
+    }
+
     #[staticmethod]
     #[pyo3(signature = (text, file=None, estimator=None))]
     fn from_toml(text: &str, file: Option<&str>, estimator: Option<&str>) -> PyResult<Self> {
@@ -86,22 +93,22 @@ impl Sensor {
 
     /// Returns the names of the columns of its estimates, for a recording on a joint if there is one.
     fn columns(&self, about: About, options: Options) -> PyResult<Vec<&'static str>> {
-        let sensor = self.on_joint(about.joint()?, None)?;
+        let sensor = on_joint(self.sensor.clone(), about.joint()?, None)?;
         Ok(options.columns(&sensor)?.iter().map(ohmstrain::Column::name).collect())
     }
 
     /// Creates a filter for live readings, on a joint if there is one.
     #[pyo3(signature = (options, about=About::default()))]
     fn live(&self, options: Options, about: About) -> PyResult<LiveFilter> {
-        let sensor = self.on_joint(about.joint()?, None)?;
+        let sensor = on_joint(self.sensor.clone(), about.joint()?, None)?;
         let filter = options.builder(&sensor)?.build().map_err(|error| of_library(&error, None))?;
         let (columns, rest) = (options.columns(&sensor)?, options.rest_resistance(&sensor)?);
-        Ok(LiveFilter::new(filter, sensor.into_owned(), columns, rest, options.known.clone()))
+        Ok(LiveFilter::new(filter, sensor, columns, rest, options.known.clone()))
     }
 
     fn lagged(&self, options: Options, lag_s: f64) -> PyResult<LaggedFilter> {
         let filter = options.builder(&self.sensor)?.build_lagged(lag_s).map_err(|error| of_library(&error, None))?;
-        Ok(LaggedFilter::new(filter, options.columns(&self.sensor)?))
+        Ok(LaggedFilter::new(filter, &self.sensor, options.columns(&self.sensor)?))
     }
 
     /// Resumes a filter from a state.
@@ -118,12 +125,12 @@ impl Sensor {
     fn resume_lagged(&self, options: Options, lag_s: f64, state: &str, file: Option<&str>) -> PyResult<LaggedFilter> {
         let filter = options.builder(&self.sensor)?.resume_lagged(lag_s, &stored(state, file)?);
         let filter = filter.map_err(|error| of_library(&error, file))?;
-        Ok(LaggedFilter::new(filter, options.columns(&self.sensor)?))
+        Ok(LaggedFilter::new(filter, &self.sensor, options.columns(&self.sensor)?))
     }
 
     fn filter(&self, py: Python, table: PyTable, about: About, options: Options) -> PyResult<Doubtful> {
-        let recording = Recording::new(table, about)?;
-        let sensor = self.for_recording(&recording, &options)?;
+        let mut recording = Recording::new(table, about)?;
+        let sensor = self.for_recording(&mut recording, &options)?;
         let rest = options.rest_resistance(&sensor)?;
         let columns = options.columns(&sensor)?;
         let mut filter = options.builder(&sensor)?.build().map_err(|error| recording.refused(&error))?;
@@ -142,8 +149,8 @@ impl Sensor {
     }
 
     fn smooth(&self, py: Python, table: PyTable, about: About, options: Options) -> PyResult<Doubtful> {
-        let recording = Recording::new(table, about)?;
-        let sensor = self.for_recording(&recording, &options)?;
+        let mut recording = Recording::new(table, about)?;
+        let sensor = self.for_recording(&mut recording, &options)?;
         let (builder, rest) = (options.builder(&sensor)?, options.rest_resistance(&sensor)?);
         let columns = options.columns(&sensor)?;
         let (estimates, warnings) = py.detach(|| {
@@ -163,8 +170,8 @@ impl Sensor {
     }
 
     fn evaluate(&self, py: Python, table: PyTable, about: About, options: Options, from_s: f64) -> PyResult<Scored> {
-        let recording = Recording::new(table, about)?;
-        let sensor = self.for_recording(&recording, &options)?;
+        let mut recording = Recording::new(table, about)?;
+        let sensor = self.for_recording(&mut recording, &options)?;
         evaluation::with_sensor(py, &recording, &sensor, &options, from_s)
     }
 

@@ -57,6 +57,7 @@ fn sensor() -> SensorParams {
         },
         sessions: None,
         unstated: Unstated::default(),
+        temperature: None,
         static_cubic: StaticCubic {
             reading_centre: 1200.0,
             reading_scale: 200.0,

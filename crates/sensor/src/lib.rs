@@ -29,6 +29,7 @@ pub use params::law::{BranchParams, GaugeParams, LawParameter, LawParams, MOST_B
 pub use params::range::RangeParams;
 pub use params::static_cubic::StaticCubic;
 pub use params::summary::{Limit, Summary, TestedSummary};
+pub use params::temperature::TemperatureParams;
 pub use params::unstated::Unstated;
 pub use params::validate::FieldError;
 pub use params::validate::table as ranges;

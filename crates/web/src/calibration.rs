@@ -117,6 +117,7 @@ fn run(wholes: Vec<TraceFile>, choices: &Choices, progress: Option<&Function>) -
         if part.trace.len() < whole.trace.len() {
             let mut whole = whole;
             whole.move_reference(lag_s).map_err(text)?;
+            let whole = whole.at_reference_temperature(&calibrated.sensor).into_owned();
             kept.push((whole, part.first_row..part.first_row + part.trace.len()));
         }
     }

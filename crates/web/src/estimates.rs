@@ -70,6 +70,7 @@ impl Estimates {
 
 /// Filters a recording row by row.
 pub fn filtered(sensor: &Sensor, recording: &TraceFile) -> Result<Estimates, String> {
+    let recording = &*recording.at_reference_temperature(sensor);
     let sensor = seated(sensor, recording)?;
     check_readings(&sensor, recording, first_rows(recording))?;
     let mut filter = sensor.filter().build().map_err(|error| error.to_string())?;
@@ -89,6 +90,7 @@ pub fn filtered(sensor: &Sensor, recording: &TraceFile) -> Result<Estimates, Str
 
 /// Smooths a recording.
 pub fn smoothed(sensor: &Sensor, recording: &TraceFile) -> Result<Estimates, String> {
+    let recording = &*recording.at_reference_temperature(sensor);
     let sensor = seated(sensor, recording)?;
     check_readings(&sensor, recording, recording.trace.len())?;
     let mut rows = Vec::with_capacity(recording.trace.len());

@@ -38,6 +38,8 @@ pub struct Filter {
 
 impl Filter {
     pub(crate) fn new(sensor: &ohmstrain::Sensor, wishes: &Wishes) -> Result<Self, String> {
+        // Readings come without temperatures.
+        let sensor = &sensor.clone().without_temperature();
         let mut builder = sensor.filter();
         if let Some(name) = wishes.estimator.as_deref().filter(|name| *name != "auto") {
             builder = builder.estimator(estimator(name)?);

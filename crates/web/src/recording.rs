@@ -25,10 +25,10 @@ impl Recording {
     }
 }
 
-/// Mounts the sensor as a recording describes.
+/// Returns the sensor for a recording: mounted as it describes, with wider intervals if it lacks temperatures.
 pub(crate) fn seated(sensor: &Sensor, recording: &TraceFile) -> Result<Sensor, String> {
     recording.check_unit(sensor.params().reading).map_err(|error| error.to_string())?;
-    let sensor = sensor.clone();
+    let sensor = recording.sensor_for(sensor);
     match recording.joint() {
         Some(joint) => sensor.on_joint(joint).map_err(|error| error.to_string()),
         None => Ok(sensor),

@@ -39,6 +39,7 @@ pub fn drawn(
     facts: &[(&'static str, String)],
     tested: Option<&Tested>,
 ) -> Result<Drawn, String> {
+    let (recording, sensor) = (&*recording.at_reference_temperature(sensor), &recording.sensor_for(sensor));
     let named = |error: ohmstrain::Error| format!("{}: {error}", recording.name);
     let (params, trace) = (sensor.params(), &recording.trace);
     let builder = sensor.filter().estimator(params.default_estimator);

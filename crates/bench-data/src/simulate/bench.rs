@@ -1,5 +1,6 @@
 use ohmstrain_model::{AdcCode, FrontEnd};
 
+use super::chamber::WarmedSensor;
 use super::individual::{Individual, REST_SPREAD};
 use super::matched::Matched;
 use super::mismatched::Mismatched;
@@ -44,7 +45,9 @@ pub fn simulate(settings: &SimulationSettings) -> Result<Trace, SettingsError> {
             values: truth.iter().map(|sample| round(sample.strain / per_unit, exact)).collect(),
             sd: Vec::new(),
         }),
-        temperature_c: None,
+        temperature_c: settings
+            .chamber
+            .map(|chamber| truth.iter().map(|at| round(chamber.at(at.time_s), 10.0)).collect()),
     })
 }
 
@@ -92,12 +95,15 @@ fn disturbed(settings: &SimulationSettings, profile: &Profile, rest_ohm: f64, tr
     let mut white = random(settings.seed, Stream::White);
     let mut drifting = random(settings.seed, Stream::Drift);
     let mut drift = Drift::new(disturbances.drift_density, &mut drifting);
+    let mut warmed = settings.chamber.map(WarmedSensor::new);
     let cycle = 2.0 * profile.peak_strain();
     let resistance = |sample: &Sample| {
         let conditioned = if disturbances.conditioning { conditioning(sample.travel / cycle) } else { 0.0 };
         let drifted = drift.advance(1.0 / settings.sample_rate_hz, &mut drifting);
         let noise = disturbances.white_sd * normal(&mut white);
-        let relative = (1.0 + sample.relative_change) * (1.0 + conditioned) * (1.0 + drifted) + noise;
+        let stretched = 1.0 + sample.relative_change;
+        let stretched = warmed.as_mut().map_or(stretched, |warmed| warmed.resistance(sample.time_s, stretched));
+        let relative = stretched * (1.0 + conditioned) * (1.0 + drifted) + noise;
         // The noise may be set large enough for a negative resistance, but resistances must be positive.
         rest_ohm * relative.max(1e-3)
     };
@@ -153,6 +159,7 @@ fn metadata(settings: &SimulationSettings) -> Metadata {
         other: other
             .map(|(key, value)| (key.to_owned(), value))
             .into_iter()
+            .chain(settings.chamber.map(|chamber| ("chamber".to_owned(), chamber.to_string())))
             .chain(settings.individual.map(|seed| ("individual".to_owned(), seed.to_string())))
             .collect(),
         ..Metadata::default()

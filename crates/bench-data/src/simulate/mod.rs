@@ -16,6 +16,7 @@
 //! ```
 
 mod bench;
+mod chamber;
 mod individual;
 mod matched;
 mod material;
@@ -28,6 +29,7 @@ mod sensor;
 mod settings;
 
 pub use bench::simulate;
+pub use chamber::Chamber;
 pub use material::{Material, UnknownMaterial};
 pub use noise::Disturbances;
 pub use person::{Followed, Person};

@@ -1,4 +1,4 @@
-use super::{Disturbances, Followed, GAUGE_LENGTH_MM, Material, Protocol};
+use super::{Chamber, Disturbances, Followed, GAUGE_LENGTH_MM, Material, Protocol};
 use crate::spec::FrontEndSpec;
 
 /// Largest number of rows in a simulated recording: a typing error must not fill the memory.
@@ -23,6 +23,8 @@ pub struct SimulationSettings {
     pub mismatched: bool,
     /// Disturbances of the reading; default all of them.
     pub disturbances: Disturbances,
+    /// A climate chamber around the sensor, whose temperature is recorded; default none.
+    pub chamber: Option<Chamber>,
     /// The electronics that convert the resistance to codes; default none: the resistance itself is recorded.
     pub front_end: Option<FrontEndSpec>,
     /// Equal seeds give equal recordings; default 1.
@@ -45,6 +47,7 @@ impl SimulationSettings {
             sample_rate_hz: 20.0,
             mismatched: false,
             disturbances: Disturbances::BENCH,
+            chamber: None,
             front_end: None,
             seed: 1,
             individual: None,
@@ -66,6 +69,7 @@ impl SimulationSettings {
         within("speed_mm_s", self.speed_mm_s, 0.01, 100.0)?;
         within("sample_rate_hz", self.sample_rate_hz, 0.1, 1e4)?;
         self.disturbances.validate()?;
+        self.chamber.map_or(Ok(()), |chamber| chamber.validate())?;
         if let Some(front_end) = &self.front_end {
             front_end.build().map_err(|error| SettingsError::FrontEnd(error.to_string()))?;
         }

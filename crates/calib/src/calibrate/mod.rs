@@ -117,6 +117,7 @@ impl Calibration {
             validity: self.validity,
             sessions: self.sessions,
             unstated: self.unstated,
+            temperature: None,
             static_cubic: self.static_cubic,
             joint: None,
             law: self.law,

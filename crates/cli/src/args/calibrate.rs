@@ -2,7 +2,7 @@ use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
 
-use super::{Auto, Branches, Estimator, Gauge, ReplaceArgs, UnitArgs, finite};
+use super::{Auto, Branches, Coefficients, Estimator, Gauge, ReplaceArgs, UnitArgs, finite};
 
 /// Flags of `calibrate`.
 #[derive(Debug, ClapArgs)]
@@ -32,6 +32,10 @@ pub struct CalibrateArgs {
     /// Prior learned from other sensors of the make (`fleet fit`): a short motion is enough then
     #[arg(long, value_name = "prior.toml", conflicts_with_all = ["branches", "gauge"])]
     pub prior: Option<PathBuf>,
+    /// Effect of temperature, instead of fitting it, for recordings with temperature_c: relative changes per kelvin, with standard
+    /// deviations, of R0 and, after a comma, of the change with strain
+    #[arg(long, value_name = "A:SD[,B:SD]", allow_hyphen_values = true)]
+    pub temperature: Option<Coefficients>,
     /// Marks in place of a reference, a file for each recording: columns time_s, strain (or angle_deg) and, if known, until_s (the body
     /// was held), strain_sd and time_sd_s. The motion between them is found with the law; a reference in the recording is not used
     #[arg(long, value_name = "marks.csv", conflicts_with = "align")]

@@ -1,7 +1,10 @@
 use std::str::FromStr;
 
-use ohmstrain_calib::GaugeFamily;
+use ohmstrain_calib::{GaugeFamily, TemperatureCoefficients};
 use ohmstrain_sensor::EstimatorKind;
+
+/// Largest relative change per kelvin.
+const LARGEST_PER_K: f64 = 0.1;
 
 /// `auto`, or a value.
 #[derive(Clone, Copy, Debug)]
@@ -55,6 +58,27 @@ impl FromStr for Gauge {
     fn from_str(text: &str) -> Result<Self, String> {
         let found = GaugeFamily::ALL.into_iter().find(|family| family.name() == text);
         found.map(Self).ok_or_else(|| "expected auto, polynomial, decaying-exponential or tunnelling".into())
+    }
+}
+
+/// Coefficients of temperature, A:SD or A:SD,B:SD.
+#[derive(Clone, Copy, Debug)]
+pub struct Coefficients(pub TemperatureCoefficients);
+
+impl FromStr for Coefficients {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let coefficient = |text: &str| -> Option<(f64, f64)> {
+            let (value, sd) = text.split_once(':')?;
+            let (value, sd) = (value.parse().ok()?, sd.parse().ok()?);
+            (f64::abs(value) <= LARGEST_PER_K && (0.0..=LARGEST_PER_K).contains(&sd)).then_some((value, sd))
+        };
+        let (rest, gain) = text.split_once(',').unwrap_or((text, "0:0"));
+        let both = coefficient(rest).zip(coefficient(gain));
+        both.map(|(rest_per_k, gain_per_k)| Self(TemperatureCoefficients { rest_per_k, gain_per_k })).ok_or_else(|| {
+            format!("expected A:SD or A:SD,B:SD, changes per kelvin up to {LARGEST_PER_K} and their deviations, e.g. 0.003:0.0005")
+        })
     }
 }
 

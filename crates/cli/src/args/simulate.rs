@@ -2,7 +2,7 @@ use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, ValueEnum};
 use ohmstrain_bench_data::FrontEndSpec;
-use ohmstrain_bench_data::simulate::{Material, Person, Protocol};
+use ohmstrain_bench_data::simulate::{Chamber, Material, Person, Protocol};
 
 use super::ReplaceArgs;
 
@@ -62,6 +62,9 @@ pub struct SimulateArgs {
     /// Joint of the protocol that the sensor sits on, if it has several
     #[arg(long, value_name = "NAME", requires = "follow")]
     pub joint: Option<String>,
+    /// Length of the protocol `mixed`, s; default 400
+    #[arg(long, value_name = "S", conflicts_with = "follow")]
+    pub duration_s: Option<f64>,
     /// Largest elongation of the 30 mm sensor, mm
     #[arg(long, default_value_t = 10.0)]
     pub elongation_mm: f64,
@@ -74,6 +77,10 @@ pub struct SimulateArgs {
     /// A sensor outside the family of laws that calibration fits: release peaks, more branches, other nonlinearity
     #[arg(long)]
     pub mismatched: bool,
+    /// A climate chamber whose temperature rises and falls, and is recorded: low_c, high_c, period_s, and the effect on R₀ and on
+    /// the change with strain, rest_per_k and gain_per_k
+    #[arg(long, value_name = "SPEC")]
+    pub chamber: Option<Chamber>,
     /// Read through electronics: the trace then holds `adc` codes
     #[arg(long, value_name = "SPEC")]
     pub front_end: Option<FrontEndSpec>,

@@ -14,7 +14,7 @@ use super::fleet;
 use super::hand;
 use super::reporting::{Reporting, Wanted};
 use crate::alignment;
-use crate::args::CalibrateArgs;
+use crate::args::{CalibrateArgs, Coefficients};
 use crate::channels::Table;
 use crate::error::CliError;
 use crate::input;
@@ -107,6 +107,9 @@ pub fn calibrate(args: &CalibrateArgs, messages: &Messages) -> Result<Outcome, C
     for (recording, whole, _) in &mut kept {
         whole.move_reference(lags_s[*recording])?;
     }
+    for (_, whole, _) in &mut kept {
+        *whole = whole.at_reference_temperature(&sensor).into_owned();
+    }
     let rows: Vec<_> = kept.iter().map(|(_, whole, _)| |row| whole.known_row(row)).collect();
     let kept =
         kept.iter().zip(&rows).map(|((_, whole, seen), row)| Kept { len: whole.trace.len(), row, seen: seen.clone() });
@@ -117,7 +120,7 @@ pub fn calibrate(args: &CalibrateArgs, messages: &Messages) -> Result<Outcome, C
     let closing = outcome.closing(&file);
     if let Some(wanted) = wanted {
         let reporting = Reporting {
-            recording: &recordings[0],
+            recording: &recordings[0].at_reference_temperature(&outcome.sensor),
             sensor: &outcome.sensor,
             kind: None,
             rest_resistance: None,
@@ -158,6 +161,9 @@ pub fn calibration(args: &CalibrateArgs) -> Calibration<'static> {
     }
     if let Some(gauge) = args.gauge.chosen() {
         calibration = calibration.gauge(gauge.0);
+    }
+    if let Some(Coefficients(coefficients)) = args.temperature {
+        calibration = calibration.temperature(coefficients);
     }
     args.branches.chosen().map_or(calibration, |branches| calibration.branches(branches.0))
 }

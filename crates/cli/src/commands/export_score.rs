@@ -23,6 +23,7 @@ pub struct OnRecording {
 impl OnRecording {
     /// Runs both over the whole recording.
     pub fn new(args: &ExportArgs, dt_s: f64, sensor: &Sensor, recording: &TraceFile) -> Result<Self, CliError> {
+        let (recording, sensor) = (recording.at_reference_temperature(sensor), &recording.sensor_for(sensor));
         let refused = |error: &dyn std::fmt::Display| CliError::Input(format!("{}: {error}", recording.name));
         let mut builder = sensor.filter();
         if let Some(estimator) = args.estimator.chosen() {

@@ -31,16 +31,18 @@ pub fn run(args: &FilterArgs, messages: &Messages) -> Result<u64, CliError> {
     let claim = args.save_state.as_deref().map(|path| rows_out.claim_beside(path, Kind::State)).transpose()?;
     let mut sensor = sensor_file::read(&args.estimate.sensor, kind)?;
     let stored = args.resume.as_deref().map(filter_state::read).transpose()?;
-    // Built again once the recording has named its joint; a stored filter already has one.
-    let mut filter = FilterRun::new(&sensor, args)?;
+    // Wrong flags are refused before a stream is waited for.
+    FilterRun::new(&sensor, args)?;
     suits::warn_of_start(args.estimate.initial_strain, &sensor, messages);
     let mut rows = stream::open(args)?;
     let header = trace::header(rows.file(), rows.line());
     check_unit(&header, rows.reading_kind(), sensor.params().reading)?;
     if let Some(joint) = trace::joint(&rows.metadata()) {
         sensor = sensor.on_joint(joint)?;
-        filter = FilterRun::new(&sensor, args)?;
     }
+    sensor = suits::sensor_for(sensor, rows.has_temperature(), rows.file(), messages);
+    rows.convert_for(&sensor);
+    let mut filter = FilterRun::new(&sensor, args)?;
     if let Some(stored) = &stored {
         filter = FilterRun::resumed(&sensor, args, stored)?;
         filter_state::go_on(&mut rows, stored)?;

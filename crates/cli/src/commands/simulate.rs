@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use ohmstrain_bench_data::Trace;
-use ohmstrain_bench_data::simulate::{Followed, SimulationSettings, simulate};
+use ohmstrain_bench_data::simulate::{Followed, Protocol, SimulationSettings, simulate};
 
 use crate::args::{ExampleArgs, ReplaceArgs, SimulateArgs};
 use crate::error::CliError;
@@ -16,13 +16,25 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
         speed_mm_s: args.speed_mm_s,
         sample_rate_hz: args.sample_rate_hz,
         mismatched: args.mismatched,
+        chamber: args.chamber,
         front_end: args.front_end,
         seed: args.seed,
         individual: args.individual,
         followed: followed(args)?,
-        ..SimulationSettings::new(args.material, args.protocol)
+        ..SimulationSettings::new(args.material, protocol(args)?)
     };
     write(&settings, args.output.as_deref(), &args.replace)
+}
+
+/// Returns the bench's protocol, of the length that was asked for.
+fn protocol(args: &SimulateArgs) -> Result<Protocol, CliError> {
+    match (args.protocol, args.duration_s) {
+        (Protocol::Mixed { .. }, Some(duration_s)) => Ok(Protocol::Mixed { duration_s }),
+        (protocol, None) => Ok(protocol),
+        (other, Some(_)) => {
+            Err(CliError::Arguments(format!("--duration-s: expected --protocol mixed, found {}", other.name())))
+        }
+    }
 }
 
 /// Returns the protocol that the simulated person follows, if there is one.

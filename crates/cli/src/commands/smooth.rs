@@ -1,7 +1,7 @@
 use std::io::{Read, Seek, SeekFrom, Write};
 
 use ohmstrain::trace::{self, check_unit};
-use ohmstrain::{Estimate, FilterBuilder, Sensor, ValidityWatch};
+use ohmstrain::{Estimate, FilterBuilder, Sensor, Thermometer, ValidityWatch};
 use tempfile::SpooledTempFile;
 
 use crate::args::{Format, SmoothArgs, WrittenArgs};
@@ -31,7 +31,8 @@ pub fn run(args: &SmoothArgs, messages: &Messages) -> Result<u64, CliError> {
         sensor = sensor.on_joint(joint)?;
     }
     let name = rows.file().to_string();
-    let readings = StoredReadings::collect(rows)?;
+    sensor = suits::sensor_for(sensor, rows.has_temperature(), &name, messages);
+    let readings = StoredReadings::collect(rows, Thermometer::new(&sensor))?;
     let rest = rest_resistance(args.estimate.rest_resistance, &sensor, readings.values(), &name)?;
     suits::check_readings(&header, &sensor, rest, readings.values())?;
     let builder = builder(&sensor, &args.estimate);

@@ -18,7 +18,7 @@ use super::plan::{ChipFilter, Plan};
 use super::vectors::Vectors;
 use super::{ExportError, too_many_branches};
 use kernel::{Recorded, SharedConstants, StepConstants};
-use readings::{DoubtConstants, FollowConstants, SieveConstants};
+use readings::{DoubtConstants, FollowConstants, SieveConstants, TemperatureConstants};
 
 /// A sensor in the form that the templates take.
 #[derive(Debug, Serialize)]
@@ -63,6 +63,8 @@ pub struct Exported {
     sieve: SieveConstants,
     doubt: DoubtConstants,
     follow: FollowConstants,
+    /// Effect of temperature; `None` if the sensor has none.
+    temperature: Option<TemperatureConstants>,
     steps: StepConstants,
     fresh_mean: Vec<Literal>,
     fresh_variance: Vec<Literal>,
@@ -195,6 +197,7 @@ impl Exported {
             beside_share: Literal(BESIDE_SHARE as f32),
             sieve: SieveConstants::new(&live.sieve),
             follow: FollowConstants::new(live.rest),
+            temperature: params.temperature.map(TemperatureConstants::new),
             doubt: DoubtConstants::new(&live.doubt, Literal((DOUBT.zero * params.limits.span()) as f32)),
             steps,
             fresh_mean: numbers.fresh.iter().map(|rate| Literal(rate.mean)).collect(),

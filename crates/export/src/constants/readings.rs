@@ -1,6 +1,7 @@
 //! Limits of plausible readings, and constants of the widening of intervals.
 
 use ohmstrain_ekf::live::{DoubtParts, RestBounds, Sieve};
+use ohmstrain_sensor::TemperatureParams;
 use serde::Serialize;
 
 use crate::literal::Literal;
@@ -45,6 +46,31 @@ pub struct FollowConstants {
     high: Option<Literal>,
     /// The usual first reading of a session, and its weight.
     start: Option<[Literal; 2]>,
+}
+
+/// Effect of temperature on the readings, per kelvin, and the calibration's temperatures, °C.
+#[derive(Debug, Serialize)]
+pub struct TemperatureConstants {
+    reference_c: Literal,
+    lower_c: Literal,
+    upper_c: Literal,
+    rest_per_k: Literal,
+    gain_per_k: Literal,
+    least_factor: Literal,
+}
+
+impl TemperatureConstants {
+    /// Converts the constants of a sensor.
+    pub fn new(effect: TemperatureParams) -> Self {
+        Self {
+            reference_c: Literal(effect.reference_c as f32),
+            lower_c: Literal(effect.lower_c as f32),
+            upper_c: Literal(effect.upper_c as f32),
+            rest_per_k: Literal(effect.rest_per_k as f32),
+            gain_per_k: Literal(effect.gain_per_k as f32),
+            least_factor: Literal(TemperatureParams::LEAST_FACTOR as f32),
+        }
+    }
 }
 
 /// Constants for rows without a reading.

@@ -717,6 +717,28 @@ static ohmstrain_status rest_reading_at(float measured, float *rest_reading)
     return OHMSTRAIN_OK;
 }
 
+{% if temperature %}
+/* 1 + per_k above_k, where that means something. */
+static float temperature_factor(float per_k, float above_k)
+{
+    const float factor = 1.0f + per_k * above_k;
+
+    return factor > << temperature.least_factor >>f ? factor : << temperature.least_factor >>f;
+}
+
+float ohmstrain_at_reference(float reading, float temperature_c)
+{
+    const float above_k = temperature_c - << temperature.reference_c >>f;
+    float change;
+
+    if (!(above_k > -1e6f && above_k < 1e6f)) {
+        return reading;
+    }
+    change = reading / temperature_factor(<< temperature.rest_per_k >>f, above_k) - OHMSTRAIN_REST_READING;
+    return OHMSTRAIN_REST_READING + change / temperature_factor(<< temperature.gain_per_k >>f, above_k);
+}
+
+{% endif %}
 ohmstrain_status ohmstrain_rest(ohmstrain_state *state, float measured)
 {
     ohmstrain_status status;

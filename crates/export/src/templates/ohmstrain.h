@@ -197,6 +197,10 @@ typedef struct ohmstrain_estimate {
  * ohmstrain_step_after, ohmstrain_predict_for: the same `dt_s` seconds after the step before, however long that is: clocks
  *                    jitter, readings get lost, and boards sleep. Steps shorter than a sixteenth of the usual one are taken for that.
  * ohmstrain_get:     the estimate after the last step.
+{% if temperature %}
+ * ohmstrain_at_reference: a reading at a temperature, degrees Celsius, as it would be at << temperature.reference_c >>: for ohmstrain_step, and for
+ *                    `measured` above. Calibrated between << temperature.lower_c >> and << temperature.upper_c >>; NAN leaves the reading as it is.
+{% endif %}
  */
 ohmstrain_status ohmstrain_start(ohmstrain_state *state);
 ohmstrain_status ohmstrain_start_at(ohmstrain_state *state, float strain);
@@ -208,6 +212,9 @@ ohmstrain_status ohmstrain_step_after(ohmstrain_state *state, float dt_s, float 
 ohmstrain_status ohmstrain_predict(ohmstrain_state *state);
 ohmstrain_status ohmstrain_predict_for(ohmstrain_state *state, float dt_s);
 ohmstrain_status ohmstrain_get(const ohmstrain_state *state, ohmstrain_estimate *estimate);
+{% if temperature %}
+float ohmstrain_at_reference(float reading, float temperature_c);
+{% endif %}
 
 #ifdef __cplusplus
 }

@@ -178,6 +178,20 @@ pub const PARTS: LiveParts<f32, Learned<'static, f32>> = LiveParts {
 {% endif %}
 };
 
+{% if temperature %}
+/// Returns a reading at a temperature, °C, as it would be at << temperature.reference_c >> °C; NaN leaves it as it is. Calibrated between << temperature.lower_c >> and
+/// << temperature.upper_c >> °C.
+#[must_use]
+pub fn at_reference(reading: f32, temperature_c: f32) -> f32 {
+    let above_k = temperature_c - << temperature.reference_c >>;
+    if !above_k.is_finite() {
+        return reading;
+    }
+    let factor = |per_k: f32| (1.0 + per_k * above_k).max(<< temperature.least_factor >>);
+    REST_READING + (reading / factor(<< temperature.rest_per_k >>) - REST_READING) / factor(<< temperature.gain_per_k >>)
+}
+
+{% endif %}
 /// The model.
 ///
 /// # Errors

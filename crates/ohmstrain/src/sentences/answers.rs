@@ -171,6 +171,10 @@ impl CalibrationDoubt {
                 "; if they are, divide them by 1000, if not say so with a line `# time_unit = s` above the header",
                 "; divide them by 1000",
             ),
+            Self::Temperature { .. } => at.of(
+                "; or give the coefficients with --temperature",
+                "; or give the coefficients with `temperature=`",
+            ),
             Self::Widened { .. } => at.of(" (--explain)", ""),
             Self::GaugesApart { .. } | Self::Copy { .. } | Self::RestsApart { .. } => "",
         };

@@ -74,6 +74,14 @@ impl fmt::Display for CalibrationDoubt {
                 significant(*most, 5),
                 100.0 * (most / least - 1.0)
             ),
+            Self::Temperature { range_k, rest_per_k: (value, sd) } => write!(
+                out,
+                "the temperature moves by {} K, but together with relaxation, drift or strain: its effect on R0, {} ± {} % per K, is \
+                 not certain and not removed; record rises and falls of the temperature while the sensor moves as usual",
+                significant(*range_k, 2),
+                significant(100.0 * value, 2),
+                significant(100.0 * sd, 1)
+            ),
             Self::Widened { of } => write!(
                 out,
                 "the {of}'s intervals are widened by {LARGEST_SD_SCALE}, the most there is: on parts of the recordings that \

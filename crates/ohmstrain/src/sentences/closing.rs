@@ -1,6 +1,8 @@
 //! Summary of a calibration, in words.
 
-use ohmstrain_sensor::{Findings, Limit, Quantity, RecordingSummary, Scores, SensorParams, TestedSummary};
+use ohmstrain_sensor::{
+    Findings, Limit, Quantity, RecordingSummary, Scores, SensorParams, TemperatureParams, TestedSummary,
+};
 use serde::Serialize;
 
 use super::number::{fixed, shown, significant};
@@ -132,7 +134,7 @@ impl Closing<'_> {
         [("Left out", error_and_coverage(found))].into_iter().chain(tested).chain(widened).chain(facts).collect()
     }
 
-    /// Returns the lines that a program prints at the end: names and sentences, seven at most.
+    /// Returns the lines that a program prints at the end: names and sentences, eight at most.
     ///
     /// ```
     /// fn print(closing: &ohmstrain::Closing) {
@@ -151,6 +153,7 @@ impl Closing<'_> {
             measured.push_str("; ");
             measured.push_str(&widened);
         }
+        lines.extend(self.params.temperature.map(|effect| ("Temperature", of_temperature(&effect))));
         if let Some(found) = self.findings {
             lines.push(("Seen", seen(&found.seen, self.params.quantity)));
             lines.push(("Limited by", limited_by(found)));
@@ -180,6 +183,21 @@ fn error_and_coverage(found: &Findings) -> String {
         error(&found.static_cubic),
         percent(width),
         percent(100.0 * covered)
+    )
+}
+
+/// Describes the effect of temperature that is removed from the readings.
+fn of_temperature(effect: &TemperatureParams) -> String {
+    let per_k = |value: f64, sd: f64| format!("{} ± {} %/K", significant(100.0 * value, 2), significant(100.0 * sd, 1));
+    let gain = (effect.gain_per_k != 0.0)
+        .then(|| format!(", change with strain {}", per_k(effect.gain_per_k, effect.gain_per_k_sd)));
+    format!(
+        "R0 {}{}; {} to {} °C, converted to {} °C",
+        per_k(effect.rest_per_k, effect.rest_per_k_sd),
+        gain.unwrap_or_default(),
+        significant(effect.lower_c, 3),
+        significant(effect.upper_c, 3),
+        significant(effect.reference_c, 3)
     )
 }
 

@@ -2,6 +2,7 @@
 
 mod marks;
 
+use std::borrow::Cow;
 use std::io::Read;
 use std::ops::Range;
 use std::path::Path;
@@ -14,7 +15,7 @@ use ohmstrain_sensor::{JointParams, Quantity, ReadingUnit};
 use thiserror::Error;
 
 use crate::number::significant;
-use crate::{CalibrationDoubt, Error, Interface, Reading, Recording};
+use crate::{CalibrationDoubt, Error, Interface, Reading, Recording, Sensor, Thermometer};
 pub use marks::{Marked, take_marks};
 
 /// Number of excluded rows that are named one by one.
@@ -171,6 +172,10 @@ impl TraceFile {
         let mut one = Recording::new(samples.time_s(), samples.reading(), samples.strain())?;
         one = if self.reference_sd().is_empty() { one } else { one.with_strain_sd(self.reference_sd())? };
         one = one.of_file(file_name(&self.name), &self.sha256);
+        one = match &self.trace.temperature_c {
+            Some(temperature_c) => one.at_temperatures_c(temperature_c)?,
+            None => one,
+        };
         one = if self.unit() == ReadingUnit::Ratio { one.of_ratios() } else { one };
         one = if self.quantity() == Some(Quantity::AngleDeg) { one.of_angles_deg() } else { one };
         let knows_ohm = metadata.resistance_unit.is_some() || self.trace.readings.converter.is_some();
@@ -189,6 +194,27 @@ impl TraceFile {
         let sd = converter.and_then(|converter| converter.sd_ohm.get(row).copied()).unwrap_or(0.0);
         let saturated = converter.is_some_and(|converter| converter.saturated.get(row).copied().unwrap_or(false));
         (time_s, Reading { value, sd, saturated })
+    }
+
+    /// Returns it with readings at the reference temperature of a sensor; itself if there is nothing to convert.
+    #[must_use]
+    pub fn at_reference_temperature(&self, sensor: &Sensor) -> Cow<'_, Self> {
+        let Some(temperature_c) = self.trace.temperature_c.as_ref().filter(|_| sensor.params().temperature.is_some())
+        else {
+            return Cow::Borrowed(self);
+        };
+        let (mut converted, mut thermometer) = (self.clone(), Thermometer::new(sensor));
+        for (reading, temperature_c) in converted.trace.readings.values.iter_mut().zip(temperature_c) {
+            *reading = thermometer.at_reference(*reading, *temperature_c);
+        }
+        Cow::Owned(converted)
+    }
+
+    /// Returns the sensor to use for it: one with wider intervals if it has no temperatures.
+    #[must_use]
+    pub fn sensor_for(&self, sensor: &Sensor) -> Sensor {
+        let sensor = sensor.clone();
+        if self.trace.temperature_c.is_some() { sensor } else { sensor.without_temperature() }
     }
 
     /// Returns the reference in a row; NaN if it is missing.

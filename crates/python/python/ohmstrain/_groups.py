@@ -96,6 +96,12 @@ class Work:
             columns = _failed(error)
         return _rows(keys, columns, schema)
 
+    def _live(self, keys: Mapping[str, Any], columns: list[str]) -> Any:
+        """Return a filter for a group with these columns."""
+        sensor = self._sensor(keys)
+        suited = sensor if "temperature_c" in columns else sensor.without_temperature()
+        return suited._core.live(_options(**self.options), self.about)
+
     def stream(self, batches: Iterator[pa.RecordBatch]) -> Iterator[pa.RecordBatch]:
         """Do the same for a group in pieces, in order of time, with one piece in memory at a time. For ``filter``."""
         live = None
@@ -104,7 +110,7 @@ class Work:
             keys = {key: group[key][0] for key in self.by}
             schema = self.schema({key: group.schema.field(key).type for key in self.by})
             try:
-                live = live or self._sensor(keys)._core.live(_options(**self.options), self.about)
+                live = live or self._live(keys, group.column_names)
                 recording = group.select([name for name in group.column_names if name in _tables.COLUMNS])
                 yield from _rows(keys, _estimates(*live.run(recording, self.about)), schema).combine_chunks().to_batches()
             except Exception as error:  # noqa: BLE001: as above

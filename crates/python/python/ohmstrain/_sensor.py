@@ -74,11 +74,13 @@ def _choices(
     gauge: str = "auto",
     prior: Prior | str | os.PathLike[str] | None = None,
     align: bool = False,
+    temperature: tuple[tuple[float, float], tuple[float, float]] | None = None,
 ) -> dict[str, Any]:
     if prior is not None and not isinstance(prior, Prior):
         prior = Prior.load(prior)
     text = None if prior is None else prior.to_toml()
-    return {"estimator": estimator, "branches": branches, "gauge": gauge, "prior": text, "align": align}
+    choices = {"estimator": estimator, "branches": branches, "gauge": gauge, "prior": text, "align": align}
+    return choices | {"temperature": temperature}
 
 
 def _split(arguments: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -155,6 +157,12 @@ class Sensor:
         """Write a ``sensor.toml``, whole or not at all."""
         _write(path, self.to_toml())
         self._file = os.fspath(path)
+
+    def without_temperature(self) -> Sensor:
+        """Return the sensor for readings whose temperature is not measured: its intervals are wider by what the calibration's temperatures
+        do to the strain.
+        """
+        return Sensor(self._core.without_temperature(), self._file)
 
     @property
     def params(self) -> dict[str, Any]:
@@ -365,9 +373,11 @@ class LiveFilter:
         self._sensor, self._options = sensor, _of_later(options)
         self._origin = _tables.Origin()
 
-    def step(self, time_s: float, reading: float | None = None) -> dict[str, Any]:
-        """Take the reading at a time, s; a missing reading is None or NaN. An error leaves the filter as it was."""
-        return self._core.step(time_s, reading)
+    def step(self, time_s: float, reading: float | None = None, temperature_c: float | None = None) -> dict[str, Any]:
+        """Take the reading at a time, s, and the temperature, °C; a missing reading is None or NaN. An error leaves the filter as it
+        was. Without any temperature use the filter of :meth:`Sensor.without_temperature`.
+        """
+        return self._core.step(time_s, reading, temperature_c)
 
     def run(self, rows: Any, **about: Any) -> Any:
         """Take the rows of a table, one piece of a recording; the next call continues after the last row. For dates and times, the
@@ -402,9 +412,9 @@ class LaggedFilter:
         self._core = core
         self._sensor, self._options, self._lag_s = sensor, _of_later(options), lag_s
 
-    def step(self, time_s: float, reading: float | None = None) -> list[dict[str, Any]]:
+    def step(self, time_s: float, reading: float | None = None, temperature_c: float | None = None) -> list[dict[str, Any]]:
         """Take a reading, and return the rows that have become due."""
-        return self._core.step(time_s, reading)
+        return self._core.step(time_s, reading, temperature_c)
 
     def finish(self) -> list[dict[str, Any]]:
         """Return the pending rows."""
@@ -450,6 +460,7 @@ def calibrate(
     gauge: str = "auto",
     prior: Prior | str | os.PathLike[str] | None = None,
     align: bool = False,
+    temperature: tuple[tuple[float, float], tuple[float, float]] | None = None,
     **about: Any,
 ) -> Sensor:
     """Calibrate a sensor on recordings with known strain.
@@ -470,6 +481,9 @@ def calibrate(
     align : bool
         Shift a late or early reference to match the readings. Without it, one that is certainly too late is an error, and one that
         may be too late is a warning.
+    temperature : ((a, sd), (b, sd))
+        Effect of temperature, for recordings with a column ``temperature_c``: relative changes per kelvin, with standard deviations, of R₀
+        and of the change with strain. Without it they are fitted, if the temperature moves enough.
     gauge_length_mm, front_end, joint, strain_unit, resistance_unit
         Metadata above the header of a trace CSV. Units that are given, ``percent`` or ``fraction`` and ``kohm`` or ``ohm``, are not
         doubted. A table of :func:`ohmstrain.read` contains them.
@@ -491,6 +505,6 @@ def calibrate(
     else:
         named = [(None, recordings)]
     tables = [(_tables.to_arrow(table), _about(name=name, **about)) for name, table in named]
-    core, doubts = _core.calibrate(tables, _choices(estimator, branches, gauge, prior, align))
+    core, doubts = _core.calibrate(tables, _choices(estimator, branches, gauge, prior, align, temperature))
     _warn(doubts)
     return Sensor(core)

@@ -13,7 +13,7 @@ from . import _core
 #: Columns of times.
 TIMES = ("time_s", "time_us")
 #: Columns of readings, and of a recording; others are not passed on.
-READINGS = ("time_s", "time_us", "resistance_ohm", "resistance_ratio", "adc")
+READINGS = ("time_s", "time_us", "resistance_ohm", "resistance_ratio", "adc", "temperature_c")
 COLUMNS = (*READINGS, "strain", "displacement_mm", "angle_deg")
 
 

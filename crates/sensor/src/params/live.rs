@@ -36,7 +36,7 @@ impl SensorParams {
     }
 
     /// Returns the smallest and largest `R/R₀ - 1` of the calibration.
-    fn relative_readings(&self) -> (f64, f64) {
+    pub(crate) fn relative_readings(&self) -> (f64, f64) {
         (self.relative(self.validity.reading_lower), self.relative(self.validity.reading_upper))
     }
 
@@ -107,6 +107,18 @@ impl SensorParams {
         self.sessions.map_or(0.0, of)
     }
 
+    /// Returns the mean change of strain with the reading over R₀.
+    pub(crate) fn strain_per_reading(&self) -> f64 {
+        let (low, high) = self.relative_readings();
+        if high > low { self.limits.span() / (high - low) } else { 0.0 }
+    }
+
+    /// Returns the variance of the strain that the effect of temperature leaves when it is removed.
+    fn temperature_variance(&self, per_reading: f64) -> f64 {
+        let readings = self.relative_readings();
+        self.temperature.map_or(0.0, |temperature| per_reading.powi(2) * temperature.left_variance(readings))
+    }
+
     /// Returns the turns of the readings; `None` for files of earlier versions.
     fn turns_seen(&self) -> Option<TurnSeen<f64>> {
         let turn = self.validity.turn() / self.rest_reading;
@@ -129,8 +141,9 @@ impl SensorParams {
         let (seen, span) = (&self.validity, self.limits.span());
         let (low, high) = self.relative_readings();
         let unread = Unread::new(motion.rate_time_s, motion.rate_sd_per_s, self.limits.to_model());
-        let per_reading = if high > low { span / (high - low) } else { 0.0 };
-        let unstated = self.session_variance(per_reading) + unstated_sd.powi(2);
+        let per_reading = self.strain_per_reading();
+        let unstated =
+            self.session_variance(per_reading) + self.temperature_variance(per_reading) + unstated_sd.powi(2);
         DoubtParts {
             low,
             high,

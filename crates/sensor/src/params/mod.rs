@@ -9,6 +9,7 @@ pub(crate) mod range;
 mod repeating;
 pub(crate) mod static_cubic;
 pub(crate) mod summary;
+pub(crate) mod temperature;
 pub(crate) mod unstated;
 pub(crate) mod validate;
 
@@ -23,6 +24,7 @@ use crate::params::law::LawParams;
 use crate::params::range::RangeParams;
 use crate::params::static_cubic::StaticCubic;
 use crate::params::summary::{Summary, TestedSummary};
+use crate::params::temperature::TemperatureParams;
 use crate::params::unstated::Unstated;
 
 /// Largest factor on the deviations of a calibrated filter. A larger factor is a sign of another error; calibrations report
@@ -69,6 +71,9 @@ pub struct SensorParams {
     /// Errors beyond those that the estimators state, from rows to which the calibration was not fitted.
     #[serde(default, skip_serializing_if = "Unstated::is_none")]
     pub unstated: Unstated,
+    /// Effect of temperature; `None` if the calibration has no temperatures, or none that moved enough.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature: Option<TemperatureParams>,
     /// Static inverse, for comparison.
     pub static_cubic: StaticCubic,
     /// Geometry of the joint, if the sensor is glued across one.

@@ -17,6 +17,7 @@ use crate::params::law::{GaugeParams, LawParams};
 use crate::params::range::RangeParams;
 use crate::params::static_cubic::StaticCubic;
 use crate::params::summary::{Summary, TestedSummary};
+use crate::params::temperature::TemperatureParams;
 use crate::params::unstated::Unstated;
 use crate::params::{JointParams, RecordingInfo, Resolution, SensorParams, Sessions, Uncertainty, Validity};
 
@@ -26,6 +27,10 @@ const SHORTEST_RANGE: f64 = 1e-9;
 const REST_BEYOND: f64 = 100.0;
 /// Largest distance of the mean strain beyond the limits, in spans.
 const MEAN_BEYOND: f64 = 10.0;
+/// Temperatures, °C, above absolute zero.
+const CELSIUS: Allowed = Allowed { least: -273.15, most: 1e4 };
+/// Relative changes per kelvin.
+const PER_K: Allowed = Allowed { least: -1.0, most: 1.0 };
 /// Number of intervals of the law's range at whose ends the gauge is checked.
 const GAUGE_POINTS: u32 = 64;
 
@@ -47,6 +52,7 @@ impl SensorParams {
         self.check_rest(&root)?;
         self.sessions.map_or(Ok(()), |sessions| sessions.validate(&root.table("sessions")))?;
         self.unstated.validate(&root.table("unstated"))?;
+        self.temperature.map_or(Ok(()), |temperature| temperature.validate(&root.table("temperature")))?;
         self.static_cubic.validate(&root.table("static_cubic"))?;
         if let Some(joint) = &self.joint {
             joint.validate(&root.table("joint"))?;
@@ -117,6 +123,17 @@ impl Unstated {
     fn validate(self, table: &Table) -> Result<(), FieldError> {
         table.number("filter_sd", self.filter_sd, AMOUNT)?;
         table.number("smoother_sd", self.smoother_sd, AMOUNT)
+    }
+}
+
+impl TemperatureParams {
+    fn validate(self, table: &Table) -> Result<(), FieldError> {
+        table.number("reference_c", self.reference_c, CELSIUS)?;
+        ends(table, ["lower_c", "upper_c"], self.lower_c, self.upper_c, CELSIUS)?;
+        table.number("rest_per_k", self.rest_per_k, PER_K)?;
+        table.number("rest_per_k_sd", self.rest_per_k_sd, AMOUNT)?;
+        table.number("gain_per_k", self.gain_per_k, PER_K)?;
+        table.number("gain_per_k_sd", self.gain_per_k_sd, AMOUNT)
     }
 }
 

@@ -5,6 +5,7 @@ mod sensors;
 mod settled;
 mod summary;
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 pub use evaluation::Evaluation;
@@ -176,7 +177,12 @@ fn calibrated(
     progress: &Progress,
 ) -> Result<(Vec<JudgedSensor>, Rivals), CliError> {
     let sensors = JudgedSensor::calibrated(training, args.estimator, args.with_correction(), progress)?;
-    let samples: Vec<Samples> = training.iter().map(TraceFile::samples).collect::<Result<_, _>>()?;
+    // All sensors have the same effect of temperature; baselines do without it, too.
+    let training: Vec<_> = match sensors.first() {
+        Some(first) => training.iter().map(|one| one.at_reference_temperature(&first.sensor)).collect(),
+        None => training.iter().map(Cow::Borrowed).collect(),
+    };
+    let samples: Vec<Samples> = training.iter().map(|one| one.samples()).collect::<Result<_, _>>()?;
     let names: Vec<&str> = training.iter().map(|recording| recording.name.as_str()).collect();
     let failed = |error| CliError::calibration(&names, &error);
     let baselines = Baselines::fit(&screen(&samples).map_err(failed)?.samples()).map_err(failed)?;
@@ -204,6 +210,7 @@ fn judge(
 ) -> Result<Judged, CliError> {
     let mut judged = Judged::default();
     let Some(JudgedSensor { sensor: first, kind, .. }) = sensors.first() else { return Ok(judged) };
+    let recording = &recording.at_reference_temperature(first);
     recording.check_unit(first.params().reading)?;
     recording.samples()?;
     recording.check_quantity(first.params().quantity)?;

@@ -117,7 +117,8 @@ impl JudgedSensor {
         baselines: BaselineScores,
         warnings: &mut Vec<String>,
     ) -> Result<Option<RecordingScores>, CliError> {
-        let estimated = estimate(recording, &self.sensor, rest_resistance, Some(self.kind), &given.known)?;
+        let sensor = recording.sensor_for(&self.sensor);
+        let estimated = estimate(recording, &sensor, rest_resistance, Some(self.kind), &given.known)?;
         if self.calibration_s.is_none() && given.name.is_none() {
             let mut watch = ValidityWatch::new(&self.sensor, rest_resistance);
             for (k, row) in estimated.filtered.iter().enumerate() {

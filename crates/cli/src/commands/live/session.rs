@@ -6,7 +6,7 @@ use std::time::Instant;
 use ohmstrain::Interface::CommandLine;
 use ohmstrain::number::significant;
 use ohmstrain::trace::{self, check_unit};
-use ohmstrain::{Error, Estimate, Filter, QuietWatch, Sensor, ValidityWatch};
+use ohmstrain::{Error, Estimate, Filter, QuietWatch, Sensor, Thermometer, ValidityWatch};
 use ohmstrain_bench_data::{Line, LineParser, Row, counted};
 
 use super::recorder::Recorder;
@@ -55,6 +55,8 @@ pub struct Session<'a> {
     args: &'a LiveArgs,
     calibrated: Sensor,
     sensor: Sensor,
+    /// Conversion of the readings to its reference temperature.
+    thermometer: Thermometer,
     lines: LineParser,
     filter: Filter,
     watch: ValidityWatch,
@@ -99,6 +101,7 @@ impl<'a> Session<'a> {
         let mut session = Self {
             args,
             calibrated: sensor.clone(),
+            thermometer: Thermometer::new(&sensor),
             sensor,
             lines,
             filter,
@@ -143,6 +146,11 @@ impl<'a> Session<'a> {
         }
         // Messages about the lines above it no longer apply.
         self.message.clear();
+        if self.sensor.params().temperature.is_some() && !self.lines.has_temperature() {
+            self.message = "no column temperature_c: intervals are wider".into();
+            self.sensor = self.sensor.clone().without_temperature();
+        }
+        self.thermometer = Thermometer::new(&self.sensor);
         if self.counts.rows > 0 { self.restart() } else { Ok(self.begin()?) }
     }
 
@@ -311,7 +319,9 @@ impl Taker for Session<'_> {
         if due.restarted {
             self.restart()?;
         }
-        let row = &due.row;
+        let mut row = due.row;
+        row.reading.value = self.thermometer.at_reference(row.reading.value, row.temperature_c);
+        let row = &row;
         let estimate = match self.filter.step(row.time_s, trace::reading(&row.reading)) {
             Ok(estimate) => estimate,
             Err(error) => {

@@ -36,6 +36,7 @@ pub fn run(args: &RefineArgs, messages: &Messages) -> Result<(), CliError> {
     let sensor = sensor_file::read(&args.sensor, Some(EstimatorKind::Ekf))?;
     let recording = input::read(&args.trace_file, &args.units.metadata())?;
     recording.check_unit(sensor.params().reading)?;
+    let recording = recording.at_reference_temperature(&sensor);
     let readings = || recording.trace.readings.values.iter().copied();
     let rest = rest_resistance(args.rest_resistance, &sensor, readings(), &recording.name)?;
     suits::check_readings(&recording.header, &sensor, rest, readings())?;
