@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Compiles and runs what `ohmstrain export` writes: C on the host with GCC and Clang, for Cortex-M0+ and -M4F, and there
-# under QEMU; the sketches against a stand-in for Arduino, and for a Mega 2560 and an Uno with Arduino's core; small
+# under QEMU; the examples for ST's HAL and for Zephyr there, too, against stand-ins for both (neither is installed); the sketches
+# against a stand-in for Arduino, and for a Mega 2560 and an Uno with Arduino's core; small
 # filters for an ATmega328P under simavr; the Rust module in a no_std crate for Cortex-M4F, and on the host through a recording, as exported C goes through it.
 #
 #   exported-c.sh [--update]
@@ -312,6 +313,78 @@ for module in "${modules[@]}"; do
         -v own_flags="$own_flags" 'function most(least, own) { return least > 3 * own ? least : 3 * own }
         BEGIN { exit !(rows > 500 && mean < most(1e-3, own_mean) && worst < most(0.1, own_worst) && flags <= 3 * own_flags) }'
 done
+
+# The examples for ST's HAL and for Zephyr on a Cortex-M4F in QEMU, with stand-ins for both: a converter that replays that recording as
+# codes, some of whose conversions fail or come late. What they print must be what the replay on the host finds in the same readings.
+
+# examples FOLDER
+examples() {
+    local folder=$1 name=${1##*/} example=$1/examples/stm32_hal found
+    local build=("${m4f[@]}" -O2 -fno-math-errno -ffunction-sections)
+    local link=(--specs=nano.specs -nostartfiles "-T$here/mps2.ld" -Wl,--gc-sections)
+    # Ten kiloohms in series; products with codes of 12 bits are exact in single precision, and so readings have the same bits here and there.
+    awk -F, -v codes="$work/replayed_codes.h" -v readings="$work/readings.csv" 'BEGIN {
+        print "time_s,resistance_ohm" >readings
+        print "static const short CODES[] = {" >codes
+    } /^[0-9]/ {
+        code = $2 == "" ? -1 : int(4095 * $2 / ($2 + 10000) + 0.5)
+        if (++row % 61 == 0) code = -2
+        print code "," >codes
+        if (code == -1) printf "%.9g,\n", $1 >readings
+        if (code >= 0) printf "%.9g,%.17g\n", $1, 10000 * code / (4095 - code) >readings
+    } END { print "};" >codes }' "$work/faulty.csv"
+    gcc -O2 "${strict[@]}" -I"$folder/src" "$folder/src/ohmstrain.c" "$folder/selftest/replay.c" -lm -o "$work/replay"
+    "$work/replay" <"$work/readings.csv" >"$work/host.csv"
+
+    arm-none-eabi-gcc "${build[@]}" "${strict[@]}" -I"$here/stm32" -I"$folder/src" -c "$example/ohmstrain_app.c" -o "$work/app.o"
+    arm-none-eabi-gcc "${build[@]}" -std=c99 -ffp-contract=off -Wall -Wextra -Werror -I"$here/stm32" -I"$here" -I"$work" -I"$folder/src" \
+        -I"$example" "${link[@]}" "$work/app.o" "$folder/src/ohmstrain.c" "$here/stm32/board.c" "$here/board.c" -lm -o "$work/hal.elf"
+    qemu "$work/hal.elf" >"$work/hal.csv" 2>&1
+    found=$(as_replayed "$work/hal.csv")
+    say "$name, STM32 HAL example" "stand-in for the HAL, Cortex-M4F: $found"
+
+    rm -rf "$work/zephyr"
+    cmake -S "$folder/examples/zephyr" -B "$work/zephyr" -DZephyr_DIR="$here/zephyr" -DCMAKE_SYSTEM_NAME=Generic \
+        -DCMAKE_TRY_COMPILE_TARGET_TYPE=STATIC_LIBRARY -DCMAKE_C_COMPILER=arm-none-eabi-gcc \
+        -DCMAKE_C_FLAGS="${build[*]} -std=c99 -Wall -Wextra -Werror" -DCMAKE_EXE_LINKER_FLAGS="${link[*]}" \
+        -DSTAND_IN_SOURCES="$here/zephyr/board.c;$here/board.c" -DSTAND_IN_INCLUDES="$here;$work" >"$work/output" 2>&1 &&
+        cmake --build "$work/zephyr" >>"$work/output" 2>&1 || {
+        cat "$work/output" >&2
+        return 1
+    }
+    qemu "$work/zephyr/zephyr.elf" >"$work/zephyr.csv" 2>&1
+    found=$(as_replayed "$work/zephyr.csv")
+    say "$name, Zephyr module and example" "stand-in for Zephyr, Cortex-M4F: $found"
+}
+
+# as_replayed FILE: fails unless lines of an example are those of the replay on the host, to one unit of the last decimal.
+as_replayed() {
+    tr -d '\r' <"$1" | paste -d, "$work/host.csv" - | awk -F, '
+        function apart(a, b) { return a > b ? a - b : b - a }
+        NR > 1 {
+            rows++
+            if (apart(1000 * $1, $5) > 1 || !(apart($2, $6) < 1.1e-5 && apart($3, $7) < 1.1e-5) || $4 != $8 || NF != 8) {
+                print "line " NR ": " $0 >"/dev/stderr"
+                exit 1
+            }
+            seen[$4]++
+        } END {
+            for (flags in seen) kinds++
+            if (!(rows > 500 && kinds > 3)) exit 1
+            print rows " lines as the replay on the host, with " kinds " kinds of flags"
+        }' || {
+        echo "$1 is not as the replay has it" >&2
+        return 1
+    }
+}
+
+for name in polynomial-0-ekf polynomial-2-corrected; do
+    examples "$work/$name"
+done
+if python3 -c 'import yaml' 2>/dev/null; then
+    python3 -c 'import sys, yaml; assert yaml.safe_load(open(sys.argv[1]))["build"] == {"cmake": "zephyr", "kconfig": "zephyr/Kconfig"}' \
+        "$work/polynomial-0-ekf/zephyr/module.yml"
+fi
 
 {
     cat <<'MD'

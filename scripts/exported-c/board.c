@@ -11,6 +11,7 @@ int _fstat(int file, struct stat *status);
 int _isatty(int file);
 int _lseek(int file, int offset, int from);
 void *_sbrk(int bytes);
+void _exit(int status);
 
 extern uint32_t stack_top, data_load, data_start, data_end, bss_start, bss_end;
 extern char heap_start;
@@ -31,6 +32,13 @@ static void leave(int passed)
 {
     /* SYS_EXIT with ADP_Stopped_ApplicationExit is success; any other reason makes QEMU return 1. */
     semihosting(0x18, (const void *)(passed ? 0x20026 : 0x20023));
+    for (;;) {
+    }
+}
+
+void _exit(int status)
+{
+    leave(status == 0);
     for (;;) {
     }
 }

@@ -148,9 +148,27 @@ fn c_is_an_arduino_library_a_self_test_and_a_readme_and_the_same_every_time() {
     assert_eq!(export(&bench, "c", "twice"), printed);
     assert_eq!(export(&bench, "c", "twice"), printed);
     for (folder, names) in [
-        ("", &["CMakeLists.txt", "README.md", "examples", "library.json", "library.properties", "selftest", "src"][..]),
+        (
+            "",
+            &[
+                "CMakeLists.txt",
+                "README.md",
+                "examples",
+                "library.json",
+                "library.properties",
+                "selftest",
+                "src",
+                "zephyr",
+            ][..],
+        ),
+        ("/examples", &["ohmstrain_plotter", "recorder", "stm32_hal", "zephyr"]),
         ("/examples/ohmstrain_plotter", &["ohmstrain_plotter.ino"]),
         ("/examples/recorder", &["recorder.ino"]),
+        ("/examples/stm32_hal", &["ohmstrain_app.c", "ohmstrain_app.h"]),
+        ("/examples/zephyr", &["CMakeLists.txt", "boards", "prj.conf", "src"]),
+        ("/examples/zephyr/boards", &["nrf52840dk_nrf52840.overlay", "nucleo_g474re.overlay"]),
+        ("/examples/zephyr/src", &["main.c"]),
+        ("/zephyr", &["CMakeLists.txt", "Kconfig", "module.yml"]),
         ("/src", &["ohmstrain.c", "ohmstrain.h"]),
         ("/selftest", &["replay.c", "selftest.c", "vectors.h"]),
     ] {

@@ -225,11 +225,20 @@ impl Variant {
             assert!(tested.starts_with("largest difference: 0 of "), "{compiler}, {name}: {tested}");
             let sketch = Command::new(if compiler == "gcc" { "g++" } else { "clang++" })
                 .current_dir(&folder)
-                .args(["-std=gnu++11", "-fsyntax-only", "-Wall", "-Wextra", "-Werror", "-I", ARDUINO, "-include"])
+                .args(["-std=gnu++11", "-fsyntax-only", "-Wall", "-Wextra", "-Werror", "-I", STAND_INS, "-include"])
                 .args(["Arduino.h", "-Isrc", "-x", "c++", "examples/ohmstrain_plotter/ohmstrain_plotter.ino"])
                 .output()
                 .unwrap();
             assert!(sketch.status.success(), "{name}: {}", String::from_utf8_lossy(&sketch.stderr));
+            for (example, headers) in EXAMPLES {
+                let compiled = Command::new(compiler)
+                    .current_dir(&folder)
+                    .args(["-std=c99", "-fsyntax-only", "-Wall", "-Wextra", "-Werror", "-Isrc", example])
+                    .arg(format!("-I{STAND_INS}/{headers}"))
+                    .output()
+                    .unwrap();
+                assert!(compiled.status.success(), "{name}: {}", String::from_utf8_lossy(&compiled.stderr));
+            }
         }
     }
 
@@ -246,8 +255,11 @@ impl Variant {
     }
 }
 
-/// A stand-in for Arduino.
-const ARDUINO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scripts/exported-c");
+/// Stand-ins: for Arduino, and in folders of it for ST's HAL and for Zephyr.
+const STAND_INS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scripts/exported-c");
+/// Examples in C, and the folder of the headers that stand in for theirs.
+const EXAMPLES: [(&str, &str); 2] =
+    [("examples/stm32_hal/ohmstrain_app.c", "stm32"), ("examples/zephyr/src/main.c", "zephyr/include")];
 
 /// The same functions of the same numbers in the same order. Only the exponentials of two libraries could differ, and both
 /// languages call that of the host.

@@ -126,13 +126,26 @@ fn too_many_branches() -> ExportError {
 /// Name in the exported folder, and template.
 type Template = (&'static str, &'static str);
 
-/// Layout of an Arduino library, which PlatformIO accepts, too: only `src` is compiled into a program, not the self-test with
-/// its `main`.
-const C: [Template; 11] = [
+/// Layout of an Arduino library, which PlatformIO accepts, too, and of a Zephyr module: only `src` is compiled into a program,
+/// not the self-test with its `main`.
+const C: [Template; 21] = [
     ("src/ohmstrain.h", include_str!("templates/ohmstrain.h")),
     ("src/ohmstrain.c", include_str!("templates/ohmstrain.c")),
     ("examples/ohmstrain_plotter/ohmstrain_plotter.ino", include_str!("templates/ohmstrain.ino")),
     ("examples/recorder/recorder.ino", include_str!("templates/recorder.ino")),
+    ("examples/stm32_hal/ohmstrain_app.h", include_str!("templates/stm32/ohmstrain_app.h")),
+    ("examples/stm32_hal/ohmstrain_app.c", include_str!("templates/stm32/ohmstrain_app.c")),
+    ("examples/zephyr/CMakeLists.txt", include_str!("templates/zephyr/app.cmake")),
+    ("examples/zephyr/prj.conf", include_str!("templates/zephyr/prj.conf")),
+    ("examples/zephyr/src/main.c", include_str!("templates/zephyr/main.c")),
+    (
+        "examples/zephyr/boards/nrf52840dk_nrf52840.overlay",
+        include_str!("templates/zephyr/nrf52840dk_nrf52840.overlay"),
+    ),
+    ("examples/zephyr/boards/nucleo_g474re.overlay", include_str!("templates/zephyr/nucleo_g474re.overlay")),
+    ("zephyr/module.yml", include_str!("templates/zephyr/module.yml")),
+    ("zephyr/CMakeLists.txt", include_str!("templates/zephyr/module.cmake")),
+    ("zephyr/Kconfig", include_str!("templates/zephyr/Kconfig")),
     ("library.properties", include_str!("templates/library.properties")),
     ("library.json", include_str!("templates/library.json")),
     ("selftest/vectors.h", include_str!("templates/vectors.h")),

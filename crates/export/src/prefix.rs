@@ -42,6 +42,9 @@ impl Prefix {
             ("name=ohmstrain\n", format!("name={prefix}\n")),
             ("includes=ohmstrain.h", format!("includes={prefix}.h")),
             ("\"name\": \"ohmstrain\"", format!("\"name\": \"{prefix}\"")),
+            ("name: ohmstrain\n", format!("name: {prefix}\n")),
+            ("config OHMSTRAIN\n", format!("config {upper}\n")),
+            ("CONFIG_OHMSTRAIN", format!("CONFIG_{upper}")),
             ("Examples → ohmstrain", format!("Examples → {prefix}")),
             ("\"ohmstrain.h\"", format!("\"{prefix}.h\"")),
         ];
