@@ -65,7 +65,8 @@ const char *ohmc_version(void);
 /* Message of the last call of this thread that failed; "" if none has. Valid until the next failure. */
 const char *ohmc_error(void);
 
-/* Reads a sensor from the text of a sensor.toml, or from a file. */
+/* Reads a sensor from the text of a sensor.toml, or from a file. Readings have no temperature here: a sensor with an effect of
+ * temperature has wider intervals. */
 ohmc_sensor *ohmc_sensor_from_text(const char *toml);
 ohmc_sensor *ohmc_sensor_from_file(const char *path);
 void ohmc_sensor_free(ohmc_sensor *sensor);

@@ -39,7 +39,7 @@ pub unsafe extern "C" fn ohmc_sensor_from_text(toml: *const c_char) -> *mut Sens
     returned(|| {
         // SAFETY: as this function's.
         let toml = unsafe { text(toml, "toml") }?;
-        Ok(Sensor::from_toml(toml)?)
+        Ok(Sensor::from_toml(toml)?.without_temperature())
     })
 }
 
@@ -53,7 +53,8 @@ pub unsafe extern "C" fn ohmc_sensor_from_file(path: *const c_char) -> *mut Sens
         // SAFETY: as this function's.
         let path = unsafe { text(path, "path") }?;
         let toml = std::fs::read_to_string(path).map_err(|error| Failure(format!("{path}: {error}")))?;
-        Sensor::from_toml(&toml).map_err(|error| Failure(error.in_file(path).to_string()))
+        let sensor = Sensor::from_toml(&toml).map_err(|error| Failure(error.in_file(path).to_string()))?;
+        Ok(sensor.without_temperature())
     })
 }
 

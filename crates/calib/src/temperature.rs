@@ -11,7 +11,7 @@ use crate::law::robust_loss::robust;
 use crate::law::structure::{GaugeFamily, LawStructure};
 use crate::law::uncertainty::Linearised;
 use crate::order::{extent, median};
-use crate::samples::{Samples, reading_range};
+use crate::samples::{Samples, SamplesError, reading_range};
 
 /// Least range of temperatures to fit an effect to, K.
 const LEAST_RANGE_K: f64 = 3.0;
@@ -117,12 +117,18 @@ fn at_reference(
 /// Each recording has its own R₀; differences between recordings are not attributed to their temperatures.
 ///
 /// # Errors
-/// If the recordings are too short, the strain is constant or no law fits.
+/// If a recording has another number of temperatures than rows; or, with coefficients that are given, if no law fits.
 pub fn fit_temperature(
     recordings: &[Samples],
     temperature_c: &[&[f64]],
     given: Option<TemperatureCoefficients>,
 ) -> Result<TemperatureFit, CalibrationError> {
+    for (samples, values) in recordings.iter().zip(temperature_c) {
+        if values.len() != samples.len() {
+            let (times, strains) = (samples.len(), samples.strain.len());
+            return Err(SamplesError::Lengths { times, readings: values.len(), strains }.into());
+        }
+    }
     let as_recorded = || recordings.iter().map(|samples| samples.reading.to_vec()).collect();
     let none = |confounded| Ok(TemperatureFit { effect: None, confounded, readings: as_recorded() });
     let Some(range) = Range::of(recordings, temperature_c) else { return none(None) };
@@ -135,7 +141,8 @@ pub fn fit_temperature(
     if range.range_k() < LEAST_RANGE_K {
         return none(None);
     }
-    let rest_only = Joint { fits_gain: false, ..joint }.fitted([0.0; 2])?;
+    // Recordings that no law fits are reported by the calibration itself.
+    let Ok(rest_only) = Joint { fits_gain: false, ..joint }.fitted([0.0; 2]) else { return none(None) };
     // A gain that cannot be told from R₀ may make the equations singular; R₀'s coefficient then covers both.
     let both = joint.fitted(rest_only.coefficients).ok();
     let both = both.filter(|both| both.own_share >= LEAST_OWN_SHARE && both.is_certain(1));

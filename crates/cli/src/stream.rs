@@ -64,9 +64,15 @@ fn of_header_flag(error: TraceError) -> CliError {
 }
 
 impl RowSource {
-    /// Converts all further readings to the reference temperature of a sensor.
-    pub fn convert_for(&mut self, sensor: &Sensor) {
-        self.thermometer = Some(Thermometer::new(sensor));
+    /// Converts all further readings to the reference temperature of a sensor; `last_c` is the last temperature of the stream that this one
+    /// continues.
+    pub fn convert_for(&mut self, sensor: &Sensor, last_c: Option<f64>) {
+        self.thermometer = Some(Thermometer::new(sensor).after(last_c));
+    }
+
+    /// Returns the last temperature, °C.
+    pub fn last_temperature_c(&self) -> Option<f64> {
+        self.thermometer.and_then(|thermometer| thermometer.last_c())
     }
 
     /// True if the rows have temperatures.

@@ -95,3 +95,26 @@ fn coefficients_can_be_given_and_are_checked() {
         assert!(run.code == Some(2) && run.stderr.contains("expected A:SD or A:SD,B:SD"), "{wrong}: {}", run.stderr);
     }
 }
+
+/// The first rows after the interruption have no temperature: the last one of the earlier stream applies.
+#[test]
+fn a_resumed_filter_keeps_the_last_temperature() {
+    let bench = chamber();
+    let text = bench.read("trace.csv");
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    let first = lines.iter().position(|line| line.starts_with("time_s")).unwrap() + 1;
+    let (cut, header) = (first + 1000, lines[..first].join("\n"));
+    for line in &mut lines[cut..cut + 3] {
+        let (left, _) = line.rsplit_once(',').unwrap();
+        *line = format!("{left},");
+    }
+    bench.write("whole.csv", lines.join("\n"));
+    bench.write("early.csv", lines[..cut].join("\n"));
+    bench.write("late.csv", format!("{header}\n{}", lines[cut..].join("\n")));
+    let filter = |words: &[&str]| bench.run(&[&["filter", "--sensor", "sensor.toml"], words].concat()).ok();
+    let whole = filter(&["whole.csv"]);
+    let early = filter(&["early.csv", "--save-state", "state.toml"]);
+    let late = filter(&["late.csv", "--resume", "state.toml"]);
+    let rows = |text: &str| text.lines().skip(1).map(str::to_owned).collect::<Vec<_>>();
+    assert_eq!(rows(&whole), [rows(&early), rows(&late)].concat());
+}

@@ -49,7 +49,8 @@ impl FusedSensor {
         Self::new(sensors, text::parse(text)?)
     }
 
-    /// Fuses sensors by these parameters.
+    /// Fuses sensors by these parameters. Their readings are not converted to one temperature: a sensor with an effect of temperature has
+    /// wider intervals.
     ///
     /// # Errors
     /// If their number or quantity of the sensors differs.
@@ -60,6 +61,7 @@ impl FusedSensor {
         if sensors.iter().any(|sensor| sensor.params().quantity != params.quantity) {
             return Err(Error::OtherQuantity);
         }
+        let sensors = sensors.into_iter().map(Sensor::without_temperature).collect();
         Ok(Self { sensors, params: Arc::new(params) })
     }
 

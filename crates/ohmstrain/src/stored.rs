@@ -32,6 +32,9 @@ pub struct Stored {
     pub clock: Option<StoredClock>,
     /// Time of 0 s, ns since 1970, in a table with dates and times.
     pub zero_ns: Option<i64>,
+    /// Last temperature of the stream, °C, for the program around the filter.
+    #[serde(default)]
+    pub temperature_c: Option<f64>,
     /// State of the watch for use outside the calibrated range.
     pub validity: Option<ValiditySeen>,
     /// State of the watch for long holds.
@@ -220,6 +223,7 @@ impl Stored {
             clock: None,
             zero_ns: None,
             validity: None,
+            temperature_c: None,
             quiet: None,
             last_s: None,
             last,

@@ -39,6 +39,32 @@ impl Thermometer {
         Self { effect: params.temperature, rest_reading: params.rest_reading, last_c: f64::NAN }
     }
 
+    /// Returns the last temperature, °C; `None` before the first.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// assert_eq!(ohmstrain::Thermometer::new(&sensor).last_c(), None);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn last_c(&self) -> Option<f64> {
+        Some(self.last_c).filter(|last_c| last_c.is_finite())
+    }
+
+    /// Continues from the last temperature of an earlier stream.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// assert_eq!(ohmstrain::Thermometer::new(&sensor).after(Some(21.5)).last_c(), Some(21.5));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn after(self, last_c: Option<f64>) -> Self {
+        Self { last_c: last_c.unwrap_or(f64::NAN), ..self }
+    }
+
     /// Converts a reading at `temperature_c`, °C, which is NaN where it was not measured, to that of the same sensor at the reference
     /// temperature.
     ///

@@ -41,7 +41,7 @@ pub fn run(args: &FilterArgs, messages: &Messages) -> Result<u64, CliError> {
         sensor = sensor.on_joint(joint)?;
     }
     sensor = suits::sensor_for(sensor, rows.has_temperature(), rows.file(), messages);
-    rows.convert_for(&sensor);
+    rows.convert_for(&sensor, stored.as_ref().and_then(|stored| stored.temperature_c));
     let mut filter = FilterRun::new(&sensor, args)?;
     if let Some(stored) = &stored {
         filter = FilterRun::resumed(&sensor, args, stored)?;
@@ -193,6 +193,7 @@ impl<'a, W: io::Write + Send> Stream<'a, W> {
     fn state(&self, rows: &RowSource) -> Result<String, CliError> {
         let mut stored = self.filter.store()?;
         stored.rest_resistance = self.sink.rest;
+        stored.temperature_c = rows.last_temperature_c();
         stored.clock = rows.last_time().map(filter_state::of_last_time);
         stored.validity = Some(self.sink.watch.seen());
         stored.quiet = Some(self.sink.quiet.seen());

@@ -224,7 +224,9 @@ impl Group {
     fn traces(&self, args: &CalibrateArgs, tables: &[Table], channel: &Channel) -> Result<Vec<TraceFile>, CliError> {
         let overrides = args.units.metadata();
         let rows = |table: &Table| {
-            let trace = table.trace(channel, &overrides)?;
+            let mut trace = table.trace(channel, &overrides)?;
+            // Readings of a hand are not converted to one temperature, here as in use.
+            trace.trace.temperature_c = None;
             Ok(trace.rows(rows_in(args, &trace)?))
         };
         tables.iter().map(rows).collect()

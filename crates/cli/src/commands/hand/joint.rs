@@ -138,7 +138,8 @@ fn angle(estimate: &Estimate) -> (f64, f64) {
 
 impl<'a> Channel<'a> {
     fn new(joint: &'a Description, entry: &'a Entry, folder: &Path, file: &str) -> Result<Self, CliError> {
-        let mut sensor = sensor_file::read(&folder.join(&entry.sensor), None)?;
+        // Readings of a hand are not converted to one temperature.
+        let mut sensor = sensor_file::read(&folder.join(&entry.sensor), None)?.without_temperature();
         if let Some(spec) = joint.joint {
             let metadata = Metadata { joint: Some(spec), ..Metadata::default() };
             if let Some(joint) = trace::joint(&metadata) {
