@@ -227,10 +227,6 @@ impl<'a> Calibration<'a> {
         recordings: &[Recording],
         samples: &[Samples],
     ) -> Result<Option<TemperatureFit>, Error> {
-        // The page has no room for the fit: 2 MB with everything.
-        if cfg!(target_arch = "wasm32") {
-            return Ok(None);
-        }
         let temperature_c: Option<Vec<&[f64]>> = recordings.iter().map(|recording| recording.temperature_c).collect();
         let fit = temperature_c.map(|temperature_c| fit_temperature(samples, &temperature_c, self.temperature));
         Ok(fit.transpose()?)

@@ -107,10 +107,6 @@ fn run(wholes: Vec<TraceFile>, choices: &Choices, progress: Option<&Function>) -
         recordings.push(part);
     }
     let mut warnings = Vec::new();
-    for part in recordings.iter().filter(|part| part.trace.temperature_c.is_some()) {
-        let what = "the effect of `temperature_c` is not fitted by this page; `ohmstrain calibrate` does that";
-        warnings.push(format!("{}: {what}", part.name));
-    }
     let lags_s = recordings.iter_mut().map(|one| on_one_clock(one, choices.align, &mut warnings));
     let lags_s: Vec<f64> = lags_s.collect::<Result<_, _>>()?;
     let start_ms = Date::now();
