@@ -66,7 +66,7 @@ fn coefficients_are_found() {
     }
 }
 
-/// Where there is no effect none is found, and a chamber that only warms cannot be told from drift.
+/// Tests a chamber without an effect, where none must be found, and one that only warms, whose effect cannot be told from drift.
 #[test]
 fn no_effect_is_found_where_there_is_none() {
     for seed in SEEDS {

@@ -91,8 +91,7 @@ impl Range {
     }
 }
 
-/// Returns readings as they would be at the reference temperature, given R₀ of each recording there. A missing temperature is that of the
-/// row before.
+/// Returns readings as they would be at the reference temperature, given R₀ of each recording there.
 fn at_reference(
     recordings: &[Samples],
     temperature_c: &[&[f64]],
@@ -100,12 +99,7 @@ fn at_reference(
     rest_readings: &[f64],
 ) -> Vec<Vec<f64>> {
     let of_one = |((samples, values), rest): ((&Samples, &&[f64]), &f64)| {
-        let mut last_c = f64::NAN;
-        let reading = |(reading, value): (&f64, &f64)| {
-            last_c = if value.is_finite() { *value } else { last_c };
-            effect.at_reference(*rest, *reading, last_c)
-        };
-        samples.reading.iter().zip(values.iter()).map(reading).collect()
+        effect.column_at_reference(*rest, samples.reading, values)
     };
     recordings.iter().zip(temperature_c).zip(rest_readings).map(of_one).collect()
 }
@@ -228,8 +222,9 @@ impl Joint<'_> {
             let begun = structure.take().map_or_else(|| fit_structure(&regression, STRUCTURE).map(|fit| fit.0), Ok)?;
             let settled = settle(begun, &regression)?;
             let system = System::new(&Linearised::new(&settled, &regression)?, &regression, self);
-            let Step { change, sd, own_share } = system.step().ok_or(CalibrationError::Singular)?;
-            rests = system.rests;
+            let step = system.step().ok_or(CalibrationError::Singular)?;
+            let change = system.of_coefficients(&step);
+            rests.clone_from(&system.rests);
             structure = Some(settled);
             // The law is fitted between the steps; where it shares an effect with the temperature, full steps overshoot.
             if change[0] * before[0] + change[1] * before[1] < 0.0 {
@@ -238,12 +233,15 @@ impl Joint<'_> {
             before = change;
             coefficients.iter_mut().zip(change).for_each(|(coefficient, change)| *coefficient += share * change);
             let moved = change.iter().map(|change| change.abs()).sum::<f64>() * self.range.range_k();
-            last = Some(Fitted { coefficients, sd, own_share, rests: rests.clone() });
+            last = Some((system, step));
             if moved < SETTLED {
                 break;
             }
         }
-        last.ok_or(CalibrationError::Singular)
+        let (system, step) = last.ok_or(CalibrationError::Singular)?;
+        let uncertain = system.deviations(&step).zip(system.own_share());
+        let (sd, own_share) = uncertain.ok_or(CalibrationError::Singular)?;
+        Ok(Fitted { coefficients, sd, own_share, rests })
     }
 
     /// Returns the difference from the reference temperature in each row, K; zero where it is missing.
@@ -264,12 +262,6 @@ struct System {
     /// Number of coefficients of temperature.
     coefficients: usize,
     rests: Vec<f64>,
-}
-
-struct Step {
-    change: [f64; 2],
-    sd: [f64; 2],
-    own_share: f64,
 }
 
 impl System {
@@ -308,15 +300,18 @@ impl System {
         }
     }
 
-    /// Returns the step of the coefficients, with standard deviations by the block jackknife; `None` if the equations are singular.
-    fn step(&self) -> Option<Step> {
-        let (size, first) = (self.normal.nrows(), self.normal.nrows() - self.coefficients);
-        let factor = Cholesky::new(self.normal.clone())?;
+    /// Returns the step of all columns' weights; `None` if the equations are singular.
+    fn step(&self) -> Option<DVector<f64>> {
         let mut gradient = self.columns.tr_mul(&self.residual);
         // The law's own columns are at their optimum.
-        gradient.rows_mut(0, first - self.drifts()).fill(0.0);
-        let change = factor.solve(&gradient);
-        let left = &self.residual - &self.columns * &change;
+        gradient.rows_mut(0, self.first() - self.drifts()).fill(0.0);
+        Some(Cholesky::new(self.normal.clone())?.solve(&gradient))
+    }
+
+    /// Returns the standard deviations of the coefficients by the block jackknife, after a step; `None` if the equations without a block
+    /// are singular.
+    fn deviations(&self, step: &DVector<f64>) -> Option<[f64; 2]> {
+        let left = &self.residual - &self.columns * step;
         let rows = self.columns.nrows();
         let mut variance = [0.0; 2];
         for block in 0..BLOCKS {
@@ -324,25 +319,31 @@ impl System {
             let columns = self.columns.rows(start, end - start);
             let gradient = columns.tr_mul(&left.rows(start, end - start));
             let moved = Cholesky::new(&self.normal - columns.tr_mul(&columns))?.solve(&gradient);
-            (first..size).zip(&mut variance).for_each(|(j, sum)| *sum += moved[j] * moved[j]);
+            self.of_coefficients(&moved).iter().zip(&mut variance).for_each(|(moved, sum)| *sum += moved * moved);
         }
         let jackknife = (BLOCKS - 1) as f64 / BLOCKS as f64;
-        let of_coefficient = |place: usize| if first + place < size { change[first + place] } else { 0.0 };
-        Some(Step {
-            change: [of_coefficient(0), of_coefficient(1)],
-            sd: variance.map(|sum| (jackknife * sum).sqrt()),
-            own_share: self.own_share(first)?,
-        })
+        Some(variance.map(|sum| (jackknife * sum).sqrt()))
     }
 
-    /// Returns the share of the temperature's variance that the columns but that of R₀'s coefficient, `first`, do not explain.
-    fn own_share(&self, first: usize) -> Option<f64> {
-        let (columns, normal) = (self.columns.clone().remove_column(first), self.normal.clone());
-        let normal = normal.remove_column(first).remove_row(first);
+    /// Returns the share of the temperature's variance that the columns but that of R₀'s coefficient do not explain.
+    fn own_share(&self) -> Option<f64> {
+        let (columns, normal) = (self.columns.clone().remove_column(self.first()), self.normal.clone());
+        let normal = normal.remove_column(self.first()).remove_row(self.first());
         let along = columns.tr_mul(&self.above_k);
         let explained = along.dot(&Cholesky::new(normal)?.solve(&along));
         let total = self.above_k.norm_squared() - self.above_k.sum().powi(2) / self.above_k.len() as f64;
         Some((self.above_k.norm_squared() - explained).max(0.0) / total)
+    }
+
+    /// Returns the place of R₀'s coefficient among the columns.
+    fn first(&self) -> usize {
+        self.normal.nrows() - self.coefficients
+    }
+
+    /// Returns the coefficients of temperature among the columns' weights; zero for a gain that is not fitted.
+    fn of_coefficients(&self, weights: &DVector<f64>) -> [f64; 2] {
+        let gain = if self.coefficients == 2 { weights[self.first() + 1] } else { 0.0 };
+        [weights[self.first()], gain]
     }
 
     /// Number of columns of drift, one for each recording.

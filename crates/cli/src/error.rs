@@ -102,7 +102,9 @@ impl From<LibraryError> for CliError {
                 Self::Arguments(refused + if quantity == Quantity::Strain { "; 10 % is 0.1" } else { "" })
             }
             LibraryError::FarRest { .. } => Self::Arguments(format!("--rest-resistance: {error}")),
-            LibraryError::Guard(_) | LibraryError::NotPositive { .. } => Self::Arguments(error.to_string()),
+            LibraryError::Guard(_) | LibraryError::NotPositive { .. } | LibraryError::NoTemperatures => {
+                Self::Arguments(error.to_string())
+            }
             LibraryError::Row { row, source } => Self::Input(format!("data row {}: {source}", row + 1)),
             _ => Self::Input(error.to_string()),
         }

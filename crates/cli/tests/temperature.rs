@@ -94,6 +94,13 @@ fn coefficients_can_be_given_and_are_checked() {
         let run = bench.run(&[&calibrate[..], &["--temperature", wrong]].concat());
         assert!(run.code == Some(2) && run.stderr.contains("expected A:SD or A:SD,B:SD"), "{wrong}: {}", run.stderr);
     }
+    let blind = ["calibrate", "blind.csv", "-o", "given.toml", "--temperature", "0.0035:0.0002"];
+    let run = bench.run(&blind);
+    assert!(
+        run.code == Some(2) && run.stderr.contains("expected recordings that all have temperatures"),
+        "{}",
+        run.stderr
+    );
 }
 
 /// The first rows after the interruption have no temperature: the last one of the earlier stream applies.

@@ -124,7 +124,7 @@ impl<'a> Calibration<'a> {
         Self { gauge: Some(family), ..self }
     }
 
-    /// Sets the effect of temperature instead of fitting it, for recordings with temperatures.
+    /// Sets the effect of temperature instead of fitting it, for recordings that all have temperatures.
     ///
     /// ```
     /// use ohmstrain::{Calibration, TemperatureCoefficients};
@@ -189,9 +189,8 @@ impl<'a> Calibration<'a> {
             return Err(Error::OtherQuantity);
         }
         let estimator = self.estimator.unwrap_or(RECIPE.estimator);
-        let as_recorded: Vec<Samples> = recordings.iter().map(|recording| recording.samples).collect();
-        let temperature = self.effect_of_temperature(recordings, &as_recorded)?;
-        let mut samples: Vec<Samples> = as_recorded;
+        let mut samples: Vec<Samples> = recordings.iter().map(|recording| recording.samples).collect();
+        let temperature = self.effect_of_temperature(recordings, &samples)?;
         if let Some(fit) = &temperature {
             for (samples, readings) in samples.iter_mut().zip(&fit.readings) {
                 *samples = samples.with_readings(readings)?;
@@ -228,6 +227,9 @@ impl<'a> Calibration<'a> {
         samples: &[Samples],
     ) -> Result<Option<TemperatureFit>, Error> {
         let temperature_c: Option<Vec<&[f64]>> = recordings.iter().map(|recording| recording.temperature_c).collect();
+        if self.temperature.is_some() && temperature_c.is_none() {
+            return Err(Error::NoTemperatures);
+        }
         let fit = temperature_c.map(|temperature_c| fit_temperature(samples, &temperature_c, self.temperature));
         Ok(fit.transpose()?)
     }

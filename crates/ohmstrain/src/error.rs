@@ -112,6 +112,10 @@ pub enum Error {
         /// Number of temperatures.
         temperatures: usize,
     },
+    /// Coefficients of temperature for recordings without temperatures.
+    #[cfg(feature = "calibrate")]
+    #[error("coefficients of temperature: expected recordings that all have temperatures, a column `temperature_c`")]
+    NoTemperatures,
     /// Slices that do not form a valid recording.
     #[cfg(feature = "calibrate")]
     #[error(transparent)]

@@ -1,7 +1,7 @@
 use ohmstrain_calib::{Samples, ScoredRow};
 use ohmstrain_sensor::{JointParams, Quantity, ReadingUnit, Scores};
 
-use crate::{Error, Sensor, Thermometer};
+use crate::{Error, Sensor};
 
 /// A recording with known strain, for calibration or comparison.
 ///
@@ -85,14 +85,6 @@ impl<'a> Recording<'a> {
             return Err(Error::Temperatures { rows, temperatures });
         }
         Ok(Self { temperature_c: Some(temperature_c), ..self })
-    }
-
-    /// Returns the readings at the reference temperature of a sensor.
-    fn readings_for(&self, sensor: &Sensor) -> Vec<f64> {
-        let mut thermometer = Thermometer::new(sensor);
-        let temperature_c = |row: usize| self.temperature_c.map_or(f64::NAN, |values| values[row]);
-        let readings = self.samples.reading().iter().enumerate();
-        readings.map(|(row, reading)| thermometer.at_reference(*reading, temperature_c(row))).collect()
     }
 
     /// States that the readings are ratios to some resistance at rest.
@@ -224,8 +216,11 @@ impl Sensor {
             return Err(Error::OtherQuantity);
         }
         self.check_reference(samples.strain().iter().copied())?;
-        let (time_s, readings) = (samples.time_s(), recording.readings_for(self));
-        let sensor = if recording.temperature_c.is_some() { self } else { &self.clone().without_temperature() };
+        let (time_s, readings) = (samples.time_s(), samples.reading());
+        let (sensor, readings) = match recording.temperature_c {
+            Some(temperature_c) => (self.clone(), self.at_reference_temperature(readings, temperature_c)),
+            None => (self.clone().without_temperature(), readings.to_vec()),
+        };
         let smoothed = sensor.smooth(time_s, &readings)?;
         let mut filter = sensor.filter().build()?;
         let mut cubic = ohmstrain_calib::running_cubic(params.static_cubic);

@@ -93,11 +93,6 @@ impl Sensor {
         Ok(sensor)
     }
 
-    /// Returns the sensor with other parameters that its learned correction does not depend on.
-    pub(crate) fn with_params(self, params: Arc<SensorParams>) -> Self {
-        Self { params, ..self }
-    }
-
     /// Builds a filter that shares the learned correction.
     pub(crate) fn build(
         &self,
@@ -198,6 +193,40 @@ impl Sensor {
         }
         self.joint()?;
         Ok(self)
+    }
+
+    /// Returns the sensor for readings whose temperature is not measured: its intervals are wider by what the calibration's temperatures
+    /// do to the strain. Without an effect of temperature it is the same sensor.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// assert_eq!(sensor.clone().without_temperature(), sensor);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn without_temperature(mut self) -> Self {
+        if self.params.temperature.is_some() {
+            Arc::make_mut(&mut self.params).forget_temperature();
+        }
+        self
+    }
+
+    /// Returns a column of readings as they would be at the reference temperature; as they are without an effect of temperature. A
+    /// missing temperature, °C, is that of the row before.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// assert_eq!(sensor.at_reference_temperature(&[1612.0, 1613.0], &[31.5, f64::NAN]), [1612.0, 1613.0]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn at_reference_temperature(&self, readings: &[f64], temperature_c: &[f64]) -> Vec<f64> {
+        match &self.params.temperature {
+            None => readings.to_vec(),
+            Some(effect) => effect.column_at_reference(self.params.rest_reading, readings, temperature_c),
+        }
     }
 
     /// Checks that the rested sensor can read `measured`.

@@ -1,5 +1,3 @@
-use std::sync::Arc;
-
 use ohmstrain_sensor::TemperatureParams;
 
 use crate::Sensor;
@@ -94,25 +92,5 @@ impl Thermometer {
             self.last_c = temperature_c;
         }
         effect.at_reference(self.rest_reading, reading, self.last_c)
-    }
-}
-
-impl Sensor {
-    /// Returns the sensor for readings whose temperature is not measured: its intervals are wider by what the calibration's temperatures
-    /// do to the strain. Without an effect of temperature it is the same sensor.
-    ///
-    /// ```
-    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
-    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
-    /// assert_eq!(sensor.clone().without_temperature(), sensor);
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    #[must_use]
-    pub fn without_temperature(self) -> Self {
-        if self.params().temperature.is_none() {
-            return self;
-        }
-        let params = Arc::new(self.params().clone().without_temperature());
-        self.with_params(params)
     }
 }

@@ -8,9 +8,7 @@ use arrow_array::types::Float64Type;
 use arrow_array::{Array, RecordBatch};
 use arrow_cast::cast;
 use arrow_schema::{ArrowError, DataType, Schema};
-use ohmstrain::{
-    Error, Estimate, Filter, FilterBuilder, JointParams, Quantity, Reading, ReadingUnit, Sensor, Thermometer,
-};
+use ohmstrain::{Error, Estimate, Filter, FilterBuilder, JointParams, Quantity, Reading, ReadingUnit, Sensor};
 use ohmstrain_calib::Samples;
 use pyo3::prelude::*;
 use pyo3_arrow::PyTable;
@@ -123,10 +121,7 @@ impl Recording {
     /// temperatures.
     pub fn convert_for(&mut self, sensor: &Sensor) -> Sensor {
         let Some(temperature_c) = &self.temperature_c else { return sensor.clone().without_temperature() };
-        let mut thermometer = Thermometer::new(sensor);
-        for (reading, temperature_c) in self.readings.iter_mut().zip(temperature_c) {
-            *reading = thermometer.at_reference(*reading, *temperature_c);
-        }
+        self.readings = sensor.at_reference_temperature(&self.readings, temperature_c);
         sensor.clone()
     }
 

@@ -15,7 +15,7 @@ use ohmstrain_sensor::{JointParams, Quantity, ReadingUnit};
 use thiserror::Error;
 
 use crate::number::significant;
-use crate::{CalibrationDoubt, Error, Interface, Reading, Recording, Sensor, Thermometer};
+use crate::{CalibrationDoubt, Error, Interface, Reading, Recording, Sensor};
 pub use marks::{Marked, take_marks};
 
 /// Number of excluded rows that are named one by one.
@@ -203,10 +203,8 @@ impl TraceFile {
         else {
             return Cow::Borrowed(self);
         };
-        let (mut converted, mut thermometer) = (self.clone(), Thermometer::new(sensor));
-        for (reading, temperature_c) in converted.trace.readings.values.iter_mut().zip(temperature_c) {
-            *reading = thermometer.at_reference(*reading, *temperature_c);
-        }
+        let mut converted = self.clone();
+        converted.trace.readings.values = sensor.at_reference_temperature(&self.trace.readings.values, temperature_c);
         Cow::Owned(converted)
     }
 

@@ -40,6 +40,17 @@ impl TemperatureParams {
         rest_reading + (reading / factor(self.rest_per_k) - rest_reading) / factor(self.gain_per_k)
     }
 
+    /// Converts a column of readings, given R₀ at the reference temperature. A missing temperature is that of the row before.
+    #[must_use]
+    pub fn column_at_reference(&self, rest_reading: f64, readings: &[f64], temperature_c: &[f64]) -> Vec<f64> {
+        let mut last_c = f64::NAN;
+        let converted = |(reading, value): (&f64, &f64)| {
+            last_c = if value.is_finite() { *value } else { last_c };
+            self.at_reference(rest_reading, *reading, last_c)
+        };
+        readings.iter().zip(temperature_c).map(converted).collect()
+    }
+
     /// Returns the variance of a reading over R₀ due to coefficients whose effect is not removed, for readings that are evenly
     /// distributed between `1 + low` and `1 + high`, and temperatures evenly distributed over the calibration's.
     fn variance(&self, rest_per_k: f64, gain_per_k: f64, (low, high): (f64, f64)) -> f64 {
@@ -56,17 +67,15 @@ impl TemperatureParams {
 }
 
 impl SensorParams {
-    /// Returns the parameters for readings whose temperature is not known: intervals are wider by what the calibration's temperatures
+    /// Prepares the parameters for readings whose temperature is not known: intervals are wider by what the calibration's temperatures
     /// do.
-    #[must_use]
-    pub fn without_temperature(mut self) -> Self {
-        let Some(temperature) = self.temperature.take() else { return self };
+    pub fn forget_temperature(&mut self) {
+        let Some(temperature) = self.temperature.take() else { return };
         let readings = self.relative_readings();
         let of_effect = temperature.variance(temperature.rest_per_k, temperature.gain_per_k, readings);
         let variance = of_effect + temperature.left_variance(readings);
         let sd = self.strain_per_reading() * variance.sqrt();
         let Unstated { filter_sd, smoother_sd } = self.unstated;
         self.unstated = Unstated { filter_sd: filter_sd.hypot(sd), smoother_sd: smoother_sd.hypot(sd) };
-        self
     }
 }

@@ -84,6 +84,7 @@ fn refuse_flags(args: &CalibrateArgs) -> Result<(), CliError> {
         ("--marks", !args.marks.is_empty()),
         ("--align", args.align),
         ("--prior", args.prior.is_some()),
+        ("--temperature", args.temperature.is_some()),
     ];
     match flags.iter().find(|(_, is_set)| *is_set) {
         Some((flag, _)) => Err(CliError::Arguments(format!(

@@ -53,7 +53,9 @@ pub struct Counts {
 /// A filter on a stream of lines.
 pub struct Session<'a> {
     args: &'a LiveArgs,
+    /// The sensor, on the joint of the last header that named one.
     calibrated: Sensor,
+    /// The same for the stream's columns.
     sensor: Sensor,
     /// Conversion of the readings to its reference temperature.
     thermometer: Thermometer,
@@ -142,13 +144,14 @@ impl<'a> Session<'a> {
         let header = self.args.port.source();
         kind.map_or(Ok(()), |kind| check_unit(&header, kind, self.sensor.params().reading))?;
         if let Some(joint) = trace::joint(&self.lines.metadata()) {
-            self.sensor = self.calibrated.clone().on_joint(joint)?;
+            self.calibrated = self.calibrated.clone().on_joint(joint)?;
         }
         // Messages about the lines above it no longer apply.
         self.message.clear();
+        self.sensor = self.calibrated.clone();
         if self.sensor.params().temperature.is_some() && !self.lines.has_temperature() {
             self.message = "no column temperature_c: intervals are wider".into();
-            self.sensor = self.sensor.clone().without_temperature();
+            self.sensor = self.calibrated.clone().without_temperature();
         }
         self.thermometer = Thermometer::new(&self.sensor);
         if self.counts.rows > 0 { self.restart() } else { Ok(self.begin()?) }
