@@ -65,6 +65,7 @@ fn fit(made: &Made) -> Result<FusionFit, CalibrationError> {
         truth: made.strain[row],
         strain: made.own[channel][row],
         strain_sd: SD[channel],
+        smoothed: Some(smoothed(made, row, channel)),
         static_cubic: 0.0,
     };
     let left_out: Vec<Vec<LeftOutRow>> = (0..CHANNELS).map(|c| (0..ROWS).map(|k| row(c, k)).collect()).collect();
@@ -72,13 +73,28 @@ fn fit(made: &Made) -> Result<FusionFit, CalibrationError> {
     fit_fusion(&(0..CHANNELS).map(channel).collect::<Vec<_>>(), Quantity::Strain, "a test")
 }
 
-/// Runs a fusion over a motion; `change` may modify the logarithms of a row.
+/// Runs a fusion of filters over a motion; `change` may modify the logarithms of a row.
 fn run(fit: &FusionFit, made: &Made, change: impl Fn(usize, &mut Vec<f64>)) -> Vec<Fused> {
-    let mut fusion = Fusion::new(Arc::new(fit.params.clone()));
+    let fusion = Fusion::new(Arc::new(fit.params.clone()));
+    fused(fusion, made, |k, channel| Member { strain: made.own[channel][k], sd: SD[channel] }, change)
+}
+
+/// Returns what a smoother knows of a row: half the error of the filter.
+fn smoothed(made: &Made, k: usize, channel: usize) -> Member {
+    Member { strain: 0.5 * (made.strain[k] + made.own[channel][k]), sd: 0.5 * SD[channel] }
+}
+
+/// Runs a fusion over a motion, with the estimate of each channel.
+fn fused(
+    mut fusion: Fusion,
+    made: &Made,
+    own: impl Fn(usize, usize) -> Member,
+    change: impl Fn(usize, &mut Vec<f64>),
+) -> Vec<Fused> {
     let step = |k: usize| {
         let mut ln_r: Vec<f64> = (0..CHANNELS).map(|c| (made.reading[c][k] / REST[c]).ln()).collect();
         change(k, &mut ln_r);
-        let state = |(c, ln_r): (usize, f64)| ChannelState { ln_r, own: Member { strain: made.own[c][k], sd: SD[c] } };
+        let state = |(c, ln_r): (usize, f64)| ChannelState { ln_r, own: own(k, c) };
         fusion.step(made.time_s[k], &ln_r.into_iter().enumerate().map(state).collect::<Vec<_>>())
     };
     (0..ROWS).map(step).collect()
@@ -117,9 +133,27 @@ fn fused_channels_err_less_than_the_best_and_cover() {
     assert!(rows.iter().filter(|row| row.faulty.is_some() || row.is_unlike).count() < ROWS / 100);
     // The channels' errors have a correlation of a half, of which the shrinkage keeps half. With two seconds each, 160 s are 80 errors: the
     // correlation is known to (1 - 0.25) / 80^½, 0.08, and half of it to 0.04.
-    let covariance = &fit.params.error_covariance;
+    let covariance = &fit.params.errors.covariance;
     let correlation = covariance[0][1] / (covariance[0][0] * covariance[1][1]).sqrt();
     assert!((correlation - 0.25).abs() < 0.12, "{correlation}");
+}
+
+/// Smoothers with half the filters' errors are weighted by errors of their own: the fused estimate is better than theirs, than the fused
+/// filters', and covers.
+#[test]
+fn fused_smoothers_err_less_than_fused_filters_and_cover() {
+    let (seen, new) = (made(1, 0.9), made(2, 0.8));
+    let fit = fit(&seen).unwrap();
+    let fusion = Fusion::of_smoothers(Arc::new(fit.params.clone())).unwrap();
+    let rows = fused(fusion, &new, |k, channel| smoothed(&new, k, channel), |_, _| {});
+    let best = (0..CHANNELS)
+        .map(|c| rmse((0..ROWS).map(|k| smoothed(&new, k, c).strain - new.strain[k])))
+        .fold(f64::INFINITY, f64::min);
+    assert!(error(&rows, &new) < 0.79 * best, "{} {best}", error(&rows, &new));
+    assert!(error(&rows, &new) < error(&run(&fit, &new, |_, _| {}), &new), "{}", error(&rows, &new));
+    assert!(covered(&rows, &new) > 0.9, "{}", covered(&rows, &new));
+    let scores = (fit.smoothed.unwrap().rmse, fit.fused.unwrap().rmse);
+    assert!(scores.0 < scores.1, "{scores:?}");
 }
 
 /// One channel is shorted, open, dead or has another gain. It is found, the estimate is nearly as good as without it, and it is used again

@@ -141,7 +141,7 @@ pub enum Command {
     /// Compare estimates with a known strain
     #[command(before_help = "Example: ohmstrain evaluate bench.csv --split 0.5 --report report.html")]
     Evaluate(EvaluateArgs),
-    /// Filter, smooth, evaluate or calibrate many recordings, in parallel; bad ones are reported and the others go on
+    /// Filter, smooth, evaluate or calibrate many recordings, also of several joints, in parallel; bad ones are reported and the others go on
     #[command(before_help = "Example: ohmstrain batch smooth recordings/*.csv --sensor sensor.toml -o smoothed")]
     Batch(BatchArgs),
     /// Learn from calibrated sensors of one make, so that a short motion calibrates the next one

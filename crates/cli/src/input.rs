@@ -1,6 +1,6 @@
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use ohmstrain::trace::TraceFile;
 use ohmstrain_bench_data::{Metadata, ParquetText, TraceReader};
@@ -109,6 +109,12 @@ pub fn sha256_of(path: &Path) -> io::Result<String> {
             count => digest.update(&bytes[..count]),
         }
     }
+}
+
+/// Returns the SHA-256 of the hashes of several files, hexadecimal.
+pub fn sha256_of_all(paths: &[PathBuf]) -> io::Result<String> {
+    let hashes = paths.iter().map(|path| sha256_of(path)).collect::<io::Result<Vec<_>>>()?;
+    Ok(hexadecimal(&Sha256::digest(hashes.concat())))
 }
 
 /// Refuses the file of a sensor or of a hand, recognised by its first bytes.

@@ -6,7 +6,8 @@ use crate::error::CliError;
 use crate::whole_file;
 
 /// Message for a file that describes a hand where a sensor is expected.
-pub const A_HAND: &str = "is the description of a hand, not of a sensor: give it to `ohmstrain hand`";
+pub const A_HAND: &str =
+    "is the description of a hand, not of a sensor: give it to `ohmstrain hand`, or to `smooth`, `live` or `evaluate`";
 
 /// Reads a sensor and checks that the estimator, or the file's default one, can be built from it.
 pub fn read(path: &Path, estimator: Option<EstimatorKind>) -> Result<Sensor, CliError> {

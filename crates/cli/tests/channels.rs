@@ -71,6 +71,14 @@ fn channels_of_one_strain_are_fused() {
     let table = bench.run(&["evaluate", "knee.csv", "--sensor", "knee.toml", "--from", UNTIL]).ok();
     assert!(table.contains("| knee ") && table.contains("inner_ohm alone"), "{table}");
 
+    // With later readings the error is smaller, and the smoother's interval narrower.
+    let json: serde_json::Value = serde_json::from_str(&scored).unwrap();
+    let (filtered, smoothed) = (&json["joints"][0]["fused"], &json["joints"][0]["smoothed"]);
+    let number = |scores: &serde_json::Value, name: &str| scores[name].as_f64().unwrap();
+    assert!(number(smoothed, "rmse") < number(filtered, "rmse") && number(smoothed, "coverage_95") > 0.9, "{smoothed}");
+    let rows = Csv::new(&bench.run(&["smooth", "knee.csv", "--sensor", "knee.toml"]).ok());
+    assert_eq!(rows.header, "time_s,knee_strain,knee_strain_sd,flags");
+
     let angles = Csv::new(&bench.run(&["hand", "knee.toml", "knee.csv"]).ok());
     assert_eq!(angles.header, "time_s,knee_strain,knee_strain_sd,flags");
     assert_eq!(angles.len(), Csv::new(&bench.read("knee.csv")).len());

@@ -34,6 +34,89 @@ fn hand() -> (Bench, usize) {
     (bench, rows)
 }
 
+/// Returns a folder with a sensor and a recording, and with a hand of two joints of that sensor, the second of which sees the recording
+/// backwards: `pair.toml`, `pair.csv`, and `back.csv` with the readings of the second joint alone.
+fn pair() -> Bench {
+    let bench = Bench::calibrated();
+    let trace = Csv::new(&bench.read("trace.csv"));
+    let (times, ohms, strains) = (trace.cells("time_s"), trace.cells("resistance_ohm"), trace.cells("strain"));
+    let rows = trace.len();
+    let (mut both, mut back) =
+        ("time_s,a_ohm,a_strain,b_ohm,b_strain\n".to_owned(), "time_s,resistance_ohm,strain\n".to_owned());
+    for row in 0..rows {
+        let last = rows - 1 - row;
+        both += &format!("{},{},{},{},{}\n", times[row], ohms[row], strains[row], ohms[last], strains[last]);
+        back += &format!("{},{},{}\n", times[row], ohms[last], strains[last]);
+    }
+    let joint =
+        |name: &str| format!("[[joints]]\nname = \"{name}\"\ncolumn = \"{name}_ohm\"\nsensor = \"sensor.toml\"\n");
+    bench.write("pair.csv", both);
+    bench.write("back.csv", back);
+    bench.write("pair.toml", format!("format = 1\n{}{}", joint("a"), joint("b")));
+    bench
+}
+
+/// Each joint's smoothed strain equals that of `smooth` alone, and its scores those of `evaluate`.
+#[test]
+fn a_hand_is_smoothed_and_scored_joint_by_joint() {
+    let bench = pair();
+    let both = Csv::new(&bench.run(&["smooth", "pair.csv", "--sensor", "pair.toml"]).ok());
+    assert_eq!(both.header, "time_s,a_strain,a_strain_sd,b_strain,b_strain_sd,flags");
+    let scored = bench.run(&["evaluate", "pair.csv", "--sensor", "pair.toml", "--json"]).ok();
+    let scored: serde_json::Value = serde_json::from_str(&scored).unwrap();
+    for (place, (joint, file)) in [("a", "trace.csv"), ("b", "back.csv")].into_iter().enumerate() {
+        let alone = Csv::new(&bench.run(&["smooth", file, "--sensor", "sensor.toml"]).ok());
+        assert_eq!(both.cells(&format!("{joint}_strain")), alone.cells("strain"), "{joint}");
+        assert_eq!(both.cells(&format!("{joint}_strain_sd")), alone.cells("strain_sd"), "{joint}");
+        let one = bench.run(&["evaluate", file, "--sensor", "sensor.toml", "--json"]).ok();
+        let one: serde_json::Value = serde_json::from_str(&one).unwrap();
+        let found = &scored["joints"][place];
+        assert_eq!((&found["fused"]["rmse"], &found["smoothed"]["rmse"]), rmse_of(&one), "{joint}");
+    }
+    for (flags, refused) in [
+        (["--estimator", "ekf"], "--estimator is for one sensor"),
+        (["--rest-resistance", "1600"], "--rest-resistance is for one sensor"),
+        (["--columns", "time_s"], "--columns is for one sensor"),
+        (["--format", "parquet"], "--format parquet is for one sensor"),
+    ] {
+        let run = bench.run(&[&["smooth", "pair.csv", "--sensor", "pair.toml"][..], &flags].concat());
+        assert!(run.code == Some(2) && run.stderr.contains(refused), "{}", run.stderr);
+    }
+    bench.write("short.csv", "time_s,a_ohm,b_ohm\n0,1600,1600\n1,x,1600\n");
+    let run = bench.run(&["smooth", "short.csv", "--sensor", "pair.toml", "-o", "none.csv"]);
+    assert!(run.code == Some(4) && run.stderr.contains("short.csv:3:"), "{}", run.stderr);
+    assert!(!bench.path("none.csv").exists());
+}
+
+/// Returns the errors of filter and smoother in the JSON of `evaluate`.
+fn rmse_of(json: &serde_json::Value) -> (&serde_json::Value, &serde_json::Value) {
+    let scores = &json["recordings"][0];
+    (&scores["rmse"], &scores["smoother"]["rmse"])
+}
+
+/// A batch writes what each command prints, and does again what another file of a sensor changes.
+#[test]
+fn hands_in_batches() {
+    let bench = pair();
+    for (command, single) in [
+        ("hand", bench.run(&["hand", "pair.toml", "pair.csv"]).ok()),
+        ("smooth", bench.run(&["smooth", "pair.csv", "--sensor", "pair.toml"]).ok()),
+        ("evaluate", bench.run(&["evaluate", "pair.csv", "--sensor", "pair.toml", "--json"]).ok()),
+    ] {
+        let batch = ["batch", command, "--sensor", "pair.toml", "-o", command, "pair.csv"];
+        assert!(bench.run(&batch).stderr.contains("1 done, 0 done before"), "{command}");
+        let ending = if command == "evaluate" { "json" } else { "csv" };
+        assert_eq!(bench.read(&format!("{command}/pair.{ending}")), single, "{command}");
+        assert!(bench.run(&batch).stderr.contains("0 done, 1 done before"), "{command}");
+    }
+    // The description stays as it is; the file of a sensor that it names does not.
+    bench.write("sensor.toml", bench.read("sensor.toml") + "\n");
+    let again = bench.run(&["batch", "hand", "--sensor", "pair.toml", "-o", "hand", "pair.csv"]);
+    assert!(again.stderr.contains("1 done, 0 done before"), "{}", again.stderr);
+    let refused = bench.run(&["batch", "filter", "--sensor", "pair.toml", "-o", "filtered", "pair.csv"]);
+    assert!(refused.code == Some(4) && refused.stderr.contains("ohmstrain hand"), "{}", refused.stderr);
+}
+
 fn in_kiloohm(number: f64) -> String {
     // Times are not changed.
     if number > 1000.0 { (number / 1000.0).to_string() } else { number.to_string() }

@@ -181,6 +181,56 @@ fn a_recording_is_played_back_recorded_marked_and_zeroed() {
     assert!(made_by.len() == 1 && made_by[0].ends_with(" live"), "{made_by:?}");
 }
 
+/// Two joints of one sensor, on a port that is joined within a line: each number is that of `filter`.
+#[test]
+fn a_hand_is_shown_recorded_and_zeroed() {
+    let bench = Bench::calibrated();
+    let trace = Csv::new(&bench.read("trace.csv"));
+    let (times, ohms) = (trace.cells("time_s"), trace.cells("resistance_ohm"));
+    let joint =
+        |name: &str| format!("[[joints]]\nname = \"{name}\"\ncolumn = \"{name}_ohm\"\nsensor = \"sensor.toml\"\n");
+    bench.write("pair.toml", format!("format = 1\n{}{}", joint("left"), joint("right")));
+    let port_path = bench.path("port");
+    let mut port = Port::plug_in(&port_path);
+    let arguments = ["live", "--port", "port", "--sensor", "pair.toml"];
+    let mut terminal = Terminal::new(&bench, cargo_bin!("ohmstrain"), &arguments);
+    terminal.wait_for("connected");
+    port.send("00,16,17\ntime_s,left_ohm,right_ohm\n");
+    let rows = 50;
+    for row in 0..rows {
+        port.send(&format!("{},{},{}\n", times[row], ohms[row], ohms[rows - 1 - row]));
+    }
+    let back: String = (0..rows).map(|row| format!("{},{}\n", times[row], ohms[rows - 1 - row])).collect();
+    bench.write("back.csv", format!("time_s,resistance_ohm\n{back}"));
+    terminal.wait_for("50 at 5.0/s");
+    for (name, file) in [("left", "trace.csv"), ("right", "back.csv")] {
+        let alone = Csv::new(&bench.run(&["filter", file, "--sensor", "sensor.toml"]).ok());
+        let number = |column: &str| alone.numbers(column)[rows - 1];
+        let shown = format!("{name:<11}{:.1} ± {:.1} %", 100.0 * number("strain"), 196.0 * number("strain_sd"));
+        terminal.wait_for(&shown);
+    }
+    terminal.press("r");
+    terminal.wait_for("recording to live-1.csv");
+    terminal.press("m");
+    port.send(&format!("{},1600,\ngarbage\n", times[rows]));
+    terminal.wait_for("51 at 5.0/s");
+    terminal.wait_for("1 missing");
+    terminal.press("r");
+    terminal.wait_for("recorded live-1.csv (1 row)");
+    terminal.press("z");
+    terminal.wait_for("R0 of each channel");
+    let left = terminal.quit();
+    assert!(left.contains("51 rows, 1 reading missing, 0 gaps, 2 lines skipped"), "{left}");
+    let recorded = Csv::new(&bench.read("live-1.csv"));
+    assert_eq!(recorded.header, "time_s,left_ohm,right_ohm,mark");
+    assert_eq!(
+        (recorded.cells("left_ohm")[0], recorded.cells("right_ohm")[0], recorded.cells("mark")[0]),
+        ("1600", "", "1")
+    );
+    let refused = bench.run(&["smooth", "live-1.csv", "--sensor", "pair.toml", "--known", "1:0"]);
+    assert!(refused.stderr.contains("--known is for one sensor"), "{}", refused.stderr);
+}
+
 #[test]
 fn readings_on_stdin_leave_the_keys_to_the_terminal() {
     let bench = Bench::calibrated();

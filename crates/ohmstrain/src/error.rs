@@ -87,6 +87,9 @@ pub enum Error {
         /// Quantity of the recordings' reference.
         found: Quantity,
     },
+    /// A fusion that does not know the errors of smoothers.
+    #[error("expected a fusion of smoothers; calibrate again, with an estimator that has a smoother")]
+    NoFusedSmoother,
     /// A number of channels that differs from that of the fusion.
     #[error("expected {expected} channels, those of the fusion, found {found}")]
     OtherChannels {

@@ -6,10 +6,14 @@ use ohmstrain_model::Joint;
 use ohmstrain_sensor::Quantity;
 use ohmstrain_sensor::fusion::{ChannelState, FUSION_FORMAT, Fusion, FusionParams, Member};
 
+use serde::Deserialize;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue, Deserializer};
+
 use crate::text::{self, Document};
 #[cfg(feature = "calibrate")]
 use crate::{Calibrated, MADE_BY, Recording, Scores};
-use crate::{Error, Estimate, FieldError, Filter, Flag, Reading, Sensor};
+use crate::{Error, Estimate, FieldError, Filter, FilterBuilder, Flag, Reading, Sensor};
 
 impl Document for FusionParams {
     const FORMAT: u32 = FUSION_FORMAT;
@@ -17,6 +21,24 @@ impl Document for FusionParams {
     fn check(&self) -> Result<(), FieldError> {
         self.validate()
     }
+
+    fn converted(document: Spanned<DeTable<'_>>, format: u32) -> Option<Result<Self, toml::de::Error>> {
+        (format == 1).then(|| of_format_1(document))
+    }
+}
+
+/// Converts a document of format 1, which has errors of filters and regressions together only.
+fn of_format_1(mut document: Spanned<DeTable<'_>>) -> Result<FusionParams, toml::de::Error> {
+    let span = document.span();
+    let table = document.get_mut();
+    let mut errors = DeTable::new();
+    for (old, new) in [("sd_scale", "sd_scale"), ("error_covariance", "covariance")] {
+        if let Some(value) = table.remove(old) {
+            errors.insert(Spanned::new(span.clone(), new.into()), value);
+        }
+    }
+    table.insert(Spanned::new(span.clone(), "errors".into()), Spanned::new(span, DeValue::Table(errors)));
+    Ok(FusionParams { format: FUSION_FORMAT, ..FusionParams::deserialize(Deserializer::from(document))? })
 }
 
 /// Several sensors that measure one strain, with the calibrated parameters of their fusion.
@@ -108,17 +130,52 @@ impl FusedSensor {
         if filters.len() != self.sensors.len() {
             return Err(Error::OtherChannels { expected: self.sensors.len(), found: filters.len() });
         }
-        let with_joint = self.sensors.iter().find(|sensor| sensor.params().joint.is_some());
-        let joint = with_joint.map(Sensor::joint).transpose()?.flatten();
-        Ok(FusedFilter { filters, fusion: Fusion::new(Arc::clone(&self.params)), joint })
+        Ok(FusedFilter { filters, running: Running::new(Fusion::new(Arc::clone(&self.params)), &self.sensors)? })
+    }
+
+    /// Smooths a whole recording with the readings of each channel, one for each time.
+    ///
+    /// # Errors
+    /// As [`FilterBuilder::smooth`], and as [`Self::smooth_of`].
+    pub fn smooth(&self, time_s: &[f64], readings: &[&[Reading]]) -> Result<Vec<FusedEstimate>, Error> {
+        self.smooth_of(self.sensors.iter().map(Sensor::filter).collect(), time_s, readings)
+    }
+
+    /// Smooths a whole recording with builders of its sensors, in their order; these may have another R₀, for example.
+    ///
+    /// # Errors
+    /// If there are more or fewer builders or readings than channels and times, if a channel's estimator has no smoother, or if the fusion
+    /// was not calibrated for smoothers; the row that was refused.
+    pub fn smooth_of(
+        &self,
+        builders: Vec<FilterBuilder>,
+        time_s: &[f64],
+        readings: &[&[Reading]],
+    ) -> Result<Vec<FusedEstimate>, Error> {
+        let expected = self.sensors.len();
+        for found in [builders.len(), readings.len()] {
+            if found != expected {
+                return Err(Error::OtherChannels { expected, found });
+            }
+        }
+        let fusion = Fusion::of_smoothers(Arc::clone(&self.params)).ok_or(Error::NoFusedSmoother)?;
+        let mut running = Running::new(fusion, &self.sensors)?;
+        let (mut smoothed, mut rest_readings) = (Vec::new(), Vec::new());
+        for (builder, readings) in builders.into_iter().zip(readings) {
+            rest_readings.push(builder.build()?.rest_reading());
+            smoothed.push(builder.smooth_readings(time_s, readings)?);
+        }
+        let row = |(k, time_s): (usize, &f64)| {
+            running.fuse(*time_s, smoothed.iter().map(|rows| rows[k]).collect(), &rest_readings)
+        };
+        Ok(time_s.iter().enumerate().map(row).collect())
     }
 }
 
 /// A running filter of several channels: their readings in, one estimate out.
 pub struct FusedFilter {
     filters: Vec<Filter>,
-    fusion: Fusion,
-    joint: Option<Joint<f64>>,
+    running: Running,
 }
 
 /// Estimate of one strain from several channels.
@@ -154,11 +211,30 @@ impl FusedFilter {
         }
         let each = self.filters.iter_mut().zip(readings);
         let channels = each.map(|(filter, reading)| filter.step(time_s, *reading)).collect::<Result<Vec<_>, _>>()?;
+        let rest_readings: Vec<f64> = self.filters.iter().map(Filter::rest_reading).collect();
+        Ok(self.running.fuse(time_s, channels, &rest_readings))
+    }
+}
+
+/// A running fusion, and the joint that the sensors span.
+struct Running {
+    fusion: Fusion,
+    joint: Option<Joint<f64>>,
+}
+
+impl Running {
+    fn new(fusion: Fusion, sensors: &[Sensor]) -> Result<Self, Error> {
+        let with_joint = sensors.iter().find(|sensor| sensor.params().joint.is_some());
+        Ok(Self { fusion, joint: with_joint.map(Sensor::joint).transpose()?.flatten() })
+    }
+
+    /// Fuses the channels' estimates of a row.
+    fn fuse(&mut self, time_s: f64, channels: Vec<Estimate>, rest_readings: &[f64]) -> FusedEstimate {
         let states: Vec<ChannelState> =
-            self.filters.iter().zip(&channels).map(|(filter, row)| state(filter, row)).collect();
+            channels.iter().zip(rest_readings).map(|(row, rest_reading)| state(row, *rest_reading)).collect();
         let fused = self.fusion.step(time_s, &states);
         let angle = self.joint.map(|joint| joint.angle_rad(fused.strain, fused.sd));
-        Ok(FusedEstimate {
+        FusedEstimate {
             time_s,
             strain: fused.strain,
             strain_sd: fused.sd,
@@ -167,17 +243,17 @@ impl FusedFilter {
             faulty: fused.faulty,
             is_unlike: fused.is_unlike,
             channels,
-        })
+        }
     }
 }
 
 /// Returns the state of a channel for the fusion, without a reading that its own filter rejects.
-fn state(filter: &Filter, row: &Estimate) -> ChannelState {
+fn state(row: &Estimate, rest_reading: f64) -> ChannelState {
     const UNREAD: [Flag; 4] = [Flag::Missing, Flag::Saturated, Flag::Implausible, Flag::Stuck];
     let is_read = !UNREAD.iter().any(|flag| row.flags.has(*flag));
     let reading = row.resistance.filter(|reading| is_read && *reading > 0.0);
     ChannelState {
-        ln_r: reading.map_or(f64::NAN, |reading| (reading / filter.rest_reading()).ln()),
+        ln_r: reading.map_or(f64::NAN, |reading| (reading / rest_reading).ln()),
         own: Member { strain: row.strain, sd: row.strain_sd },
     }
 }
@@ -191,6 +267,8 @@ pub struct Fused {
     pub sensor: FusedSensor,
     /// Scores of the fused estimate; `None` if they could not be measured.
     pub scores: Option<Scores>,
+    /// Scores of the fused smoothers; `None` if a channel has no smoother.
+    pub smoothed: Option<Scores>,
     /// Scores of each channel alone on the same rows.
     pub channels: Vec<Option<Scores>>,
 }
@@ -223,5 +301,10 @@ pub fn fuse(channels: &[(&Calibrated, &[Recording])]) -> Result<Fused, Error> {
     }
     let quantity = sensors.first().map_or(Quantity::Strain, |sensor| sensor.params().quantity);
     let fit = fit_fusion(&learned, quantity, MADE_BY)?;
-    Ok(Fused { sensor: FusedSensor::new(sensors, fit.params)?, scores: fit.fused, channels: fit.channels })
+    Ok(Fused {
+        sensor: FusedSensor::new(sensors, fit.params)?,
+        scores: fit.fused,
+        smoothed: fit.smoothed,
+        channels: fit.channels,
+    })
 }

@@ -28,10 +28,21 @@ impl FilterBuilder<'_> {
             return Err(Error::Lengths { times: time_s.len(), readings: readings.len() });
         }
         self.sensor.check_unit(readings.iter().copied(), self.rest_resistance)?;
+        self.smooth_readings(time_s, &readings.iter().copied().map(Reading::from).collect::<Vec<_>>())
+    }
+
+    /// Smooths a whole recording of readings that may be a converter's; their unit is not checked.
+    ///
+    /// # Errors
+    /// As [`Self::build`]; the row that was refused; or times and readings of different number.
+    pub fn smooth_readings(self, time_s: &[f64], readings: &[Reading]) -> Result<Vec<Estimate>, Error> {
+        if time_s.len() != readings.len() {
+            return Err(Error::Lengths { times: time_s.len(), readings: readings.len() });
+        }
         let mut rows = Vec::with_capacity(time_s.len());
         self.smooth_backward(
             time_s.len(),
-            |row| (time_s[row], Reading::from(readings[row])),
+            |row| (time_s[row], readings[row]),
             |_, segment| {
                 rows.extend(segment.iter().rev());
                 Ok::<(), Error>(())

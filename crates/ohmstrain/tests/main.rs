@@ -4,6 +4,7 @@ mod another_day;
 mod calibration_doubts;
 mod doubts;
 mod empty_rows;
+mod fused;
 mod known;
 mod lag;
 mod motion_doubts;

@@ -17,6 +17,7 @@ use crate::law::structure::LawFit;
 use crate::motion_stats::MotionStats;
 use crate::prior::CorrectionPrior;
 use crate::samples::Samples;
+use ohmstrain_sensor::fusion::Member;
 use ohmstrain_sensor::{
     EstimatorKind, EstimatorParams, FilterParts, Findings, Learned, NoParameters, RangeParams, RecordingSummary,
     SensorError, TENTHS, Unstated,
@@ -70,6 +71,8 @@ pub struct LeftOutRow {
     pub strain: f64,
     /// Its standard deviation, including the unstated error estimated on the other quarters.
     pub strain_sd: f64,
+    /// The smoother's strain with its standard deviation, which includes its unstated error; `None` if the estimator has no smoother.
+    pub smoothed: Option<Member>,
     /// The static cubic's strain.
     pub static_cubic: f64,
 }
@@ -99,7 +102,10 @@ impl Scored {
 
     /// Adds unstated errors to the standard deviations.
     fn widen(&mut self, unstated: Unstated) {
-        self.rows.iter_mut().for_each(|row| row.strain_sd = row.strain_sd.hypot(unstated.filter_sd));
+        for row in &mut self.rows {
+            row.strain_sd = row.strain_sd.hypot(unstated.filter_sd);
+            row.smoothed.iter_mut().for_each(|member| member.sd = member.sd.hypot(unstated.smoother_sd));
+        }
         self.filter.iter_mut().for_each(|row| *row = row.with_unstated(unstated.filter_sd));
         self.smoother.iter_mut().for_each(|row| *row = row.with_unstated(unstated.smoother_sd));
     }
@@ -200,14 +206,14 @@ impl Check<'_> {
                 let row = |strain: f64, sd: Option<f64>| ScoredRow { time_s, truth, strain, sd };
                 let estimate = filter.output().estimate;
                 let (strain, strain_sd) = (estimate.strain.mean, estimate.strain.sd());
-                let left_out = LeftOutRow { recording: r, row: k, truth, strain, strain_sd, static_cubic: on_cubic };
+                let smoothed = smoothed.as_ref().map(|rows| rows[k].estimate.strain);
+                let smoothed = smoothed.map(|strain| Member { strain: strain.mean, sd: strain.sd() });
+                let left_out =
+                    LeftOutRow { recording: r, row: k, truth, strain, strain_sd, smoothed, static_cubic: on_cubic };
                 of_recording.rows.push(left_out);
                 of_recording.filter.push(row(strain, Some(strain_sd)));
                 of_recording.directions.push((directions[r][k], estimate.rate.mean, strain - truth));
-                if let Some(smoothed) = &smoothed {
-                    let strain = smoothed[k].estimate.strain;
-                    of_recording.smoother.push(row(strain.mean, Some(strain.sd())));
-                }
+                of_recording.smoother.extend(smoothed.map(|member| row(member.strain, Some(member.sd))));
                 of_recording.static_cubic.push(row(on_cubic, None));
             }
             scored.append(of_recording);

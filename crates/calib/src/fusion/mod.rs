@@ -7,7 +7,7 @@ mod regressions;
 
 use std::collections::HashMap;
 
-use ohmstrain_sensor::fusion::{FUSION_FORMAT, FusionParams, Member};
+use ohmstrain_sensor::fusion::{FUSION_FORMAT, FusionErrors, FusionParams, Member};
 use ohmstrain_sensor::{Quantity, RangeParams, Scores};
 
 use crate::CalibrationError;
@@ -37,7 +37,7 @@ pub struct FusionChannel<'a> {
     pub recordings: &'a [Samples<'a>],
     /// R₀ of the calibrated sensor.
     pub rest_reading: f64,
-    /// Its filter's estimates of held-out parts.
+    /// Its filter's and its smoother's estimates of held-out parts.
     pub left_out: &'a [LeftOutRow],
 }
 
@@ -48,6 +48,8 @@ pub struct FusionFit {
     pub params: FusionParams,
     /// Scores of the fused estimate; `None` if the channels have no estimates of held-out parts.
     pub fused: Option<Scores>,
+    /// Scores of the fused smoothers; `None` if a channel has no smoother.
+    pub smoothed: Option<Scores>,
     /// Scores of each channel alone on the same rows.
     pub channels: Vec<Option<Scores>>,
 }
@@ -70,63 +72,73 @@ pub fn fit_fusion(
     let params = FusionParams {
         format: FUSION_FORMAT,
         made_by: made_by.into(),
-        sd_scale: 1.0,
         quantity,
         limits,
         novelty: neighbours.novelty,
         channel_sd: neighbours.channel_sd.clone(),
-        error_covariance: identity(channels.len() + regressions.len()),
         low_pass_s,
+        errors: FusionErrors { sd_scale: 1.0, covariance: identity(channels.len() + regressions.len()) },
+        filters: None,
+        smoothers: None,
         regressions,
         rows: readings.thinned(|_| true, KEPT_ROWS).map(|row| row.seen.clone()).collect(),
     };
-    let judged = judged(channels, &readings, &left_out);
-    if judged.is_empty() {
-        return Ok(FusionFit { params, fused: None, channels: vec![None; channels.len()] });
+    let judged_by = |own| judged(channels, &readings, &left_out, own);
+    let filtered = judged_by(|row| Some(Member { strain: row.strain, sd: row.strain_sd }));
+    if filtered.is_empty() {
+        return Ok(FusionFit { params, fused: None, smoothed: None, channels: vec![None; channels.len()] });
     }
-    let covariance = covariance(&judged);
-    let with = |members: usize| {
-        let params = FusionParams {
-            error_covariance: covariance[..members].iter().map(|of_member| of_member[..members].to_vec()).collect(),
-            regressions: params.regressions[..members - channels.len()].to_vec(),
-            ..params.clone()
-        };
-        scaled(params, &judged, &neighbours)
-    };
-    let (all, channels_only) = (with(covariance.len()), with(channels.len()));
-    let params = if log_loss(&all, &judged, &neighbours) <= log_loss(&channels_only, &judged, &neighbours) {
-        all
-    } else {
-        channels_only
-    };
-    let fused = score(&judged, &fused(&params, &judged, &neighbours));
-    let of_channel = |channel| score(&judged, &judged.iter().map(|one| Some(one.members[channel])).collect::<Vec<_>>());
-    Ok(FusionFit { fused, channels: (0..channels.len()).map(of_channel).collect(), params })
+    let check = Check { params: &params, neighbours: &neighbours };
+    let (all, filters) = (check.errors(&filtered, params.members()), check.errors(&filtered, channels.len()));
+    let helps = check.log_loss(&all, &filtered) <= check.log_loss(&filters, &filtered);
+    let errors = if helps { all } else { filters.clone() };
+    let smoothed = judged_by(|row| row.smoothed);
+    let smoothers = Some(check.errors(&smoothed, errors.covariance.len())).filter(|_| !smoothed.is_empty());
+    let fused = score(&filtered, &check.fused(&errors, &filtered));
+    let smoothed_score = smoothers.as_ref().and_then(|errors| score(&smoothed, &check.fused(errors, &smoothed)));
+    let of_channel =
+        |channel| score(&filtered, &filtered.iter().map(|one| Some(one.members[channel])).collect::<Vec<_>>());
+    let alone = (0..channels.len()).map(of_channel).collect();
+    let regressions = if helps { params.regressions } else { Vec::new() };
+    let params = FusionParams { errors, filters: Some(filters), smoothers, regressions, ..params };
+    Ok(FusionFit { params, fused, smoothed: smoothed_score, channels: alone })
 }
 
-/// Returns the fused estimates of judged rows.
-fn fused(params: &FusionParams, judged: &[Judged], neighbours: &Neighbours) -> Vec<Option<Member>> {
-    let members = params.error_covariance.len();
-    judged.iter().map(|one| params.fused(&one.members[..members], neighbours.excess(one.row.place))).collect()
+/// A fusion on held-out blocks.
+struct Check<'a> {
+    params: &'a FusionParams,
+    neighbours: &'a Neighbours,
 }
 
-/// Returns the parameters with the factor that makes the fused interval cover the worst block.
-fn scaled(params: FusionParams, judged: &[Judged], neighbours: &Neighbours) -> FusionParams {
-    let mut blocks = vec![Vec::new(); BLOCKS];
-    for (one, member) in judged.iter().zip(fused(&params, judged, neighbours)) {
-        blocks[one.row.block].extend(member.map(|member| (member.strain - one.row.seen.strain).abs() / member.sd));
+impl Check<'_> {
+    /// Returns the errors of the first `members`, with the factor that makes the fused interval cover the worst block.
+    fn errors(&self, judged: &[Judged], members: usize) -> FusionErrors {
+        let unscaled = FusionErrors { sd_scale: 1.0, covariance: covariance(judged, members) };
+        let mut blocks = vec![Vec::new(); BLOCKS];
+        for (one, member) in judged.iter().zip(self.fused(&unscaled, judged)) {
+            blocks[one.row.block].extend(member.map(|member| (member.strain - one.row.seen.strain).abs() / member.sd));
+        }
+        FusionErrors { sd_scale: sd_scale(&blocks), ..unscaled }
     }
-    FusionParams { sd_scale: sd_scale(&blocks), ..params }
-}
 
-/// Returns the mean negative log density of the strain under the fused estimate.
-fn log_loss(params: &FusionParams, judged: &[Judged], neighbours: &Neighbours) -> f64 {
-    let fused = fused(params, judged, neighbours);
-    let losses = judged.iter().zip(&fused).map(|(one, member)| {
-        let loss = |member: &Member| 0.5 * ((member.strain - one.row.seen.strain) / member.sd).powi(2) + member.sd.ln();
-        member.as_ref().map_or(f64::INFINITY, loss)
-    });
-    losses.sum::<f64>() / judged.len() as f64
+    /// Returns the fused estimates of judged rows.
+    fn fused(&self, errors: &FusionErrors, judged: &[Judged]) -> Vec<Option<Member>> {
+        let members = errors.covariance.len();
+        let fused =
+            |one: &Judged| self.params.fused(errors, &one.members[..members], self.neighbours.excess(one.row.place));
+        judged.iter().map(fused).collect()
+    }
+
+    /// Returns the mean negative log density of the strain under the fused estimate.
+    fn log_loss(&self, errors: &FusionErrors, judged: &[Judged]) -> f64 {
+        let fused = self.fused(errors, judged);
+        let losses = judged.iter().zip(&fused).map(|(one, member)| {
+            let loss =
+                |member: &Member| 0.5 * ((member.strain - one.row.seen.strain) / member.sd).powi(2) + member.sd.ln();
+            member.as_ref().map_or(f64::INFINITY, loss)
+        });
+        losses.sum::<f64>() / judged.len() as f64
+    }
 }
 
 /// Returns the range of the strain.
@@ -149,11 +161,16 @@ struct Judged<'a> {
     members: Vec<Member>,
 }
 
-/// Returns the rows that all channels have estimated, with the regressions' estimates.
-fn judged<'a>(channels: &[FusionChannel], readings: &'a Readings, regressions: &[Vec<Member>]) -> Vec<Judged<'a>> {
+/// Returns the rows that all channels have estimated, with the regressions' estimates; `own` is the estimate of a channel.
+fn judged<'a>(
+    channels: &[FusionChannel],
+    readings: &'a Readings,
+    regressions: &[Vec<Member>],
+    own: fn(&LeftOutRow) -> Option<Member>,
+) -> Vec<Judged<'a>> {
     let by_row = |channel: &FusionChannel| -> HashMap<(usize, usize), Member> {
-        let of_row = |one: &LeftOutRow| ((one.recording, one.row), Member { strain: one.strain, sd: one.strain_sd });
-        channel.left_out.iter().map(of_row).collect()
+        let of_row = |one: &LeftOutRow| Some(((one.recording, one.row), own(one)?));
+        channel.left_out.iter().filter_map(of_row).collect()
     };
     let own: Vec<HashMap<(usize, usize), Member>> = channels.iter().map(by_row).collect();
     let of_row = |row: &'a ReadingsRow| {
@@ -165,14 +182,13 @@ fn judged<'a>(channels: &[FusionChannel], readings: &'a Readings, regressions: &
     readings.rows.iter().filter_map(of_row).collect()
 }
 
-/// Returns covariances about zero of the members' errors in units of their standard deviations. Correlations are shrunk toward zero, and a
-/// member that errs less than it states gets no extra weight.
-fn covariance(judged: &[Judged]) -> Vec<Vec<f64>> {
-    let members = judged.first().map_or(0, |one| one.members.len());
+/// Returns covariances about zero of the first members' errors in units of their standard deviations. Correlations are shrunk toward zero,
+/// and a member that errs less than it states gets no extra weight.
+fn covariance(judged: &[Judged], members: usize) -> Vec<Vec<f64>> {
     let mut sums = vec![vec![0.0; members]; members];
     for one in judged {
         let deviations: Vec<f64> =
-            one.members.iter().map(|member| (member.strain - one.row.seen.strain) / member.sd).collect();
+            one.members[..members].iter().map(|member| (member.strain - one.row.seen.strain) / member.sd).collect();
         for (i, of_member) in sums.iter_mut().enumerate() {
             of_member.iter_mut().zip(&deviations).for_each(|(sum, other)| *sum += deviations[i] * other);
         }

@@ -24,7 +24,7 @@ pub struct BatchArgs {
     /// Folder for what comes of the recordings, and for the summary
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
-    /// The sensor of recordings for which the manifest names none
+    /// The sensor, or the hand.toml, of recordings for which the manifest names none
     #[arg(long, value_name = "sensor.toml")]
     pub sensor: Option<PathBuf>,
     /// Recordings at a time; by default as many as the machine has cores
@@ -54,6 +54,8 @@ pub enum BatchCommand {
     Filter,
     /// Estimates, each from all readings
     Smooth,
+    /// Angles of all joints of the hand.toml that --sensor names
+    Hand,
     /// Scores, as JSON
     Evaluate,
     /// A sensor of each recording, or of those that the manifest gives the same name in its column sensor
@@ -66,6 +68,7 @@ impl BatchCommand {
         match self {
             Self::Filter => "filter",
             Self::Smooth => "smooth",
+            Self::Hand => "hand",
             Self::Evaluate => "evaluate",
             Self::Calibrate => "calibrate",
         }

@@ -10,7 +10,7 @@ use super::{Auto, Estimator, ReplaceArgs, SetupArgs, UnitArgs, finite, positive}
 /// Flags that `filter`, `smooth` and `live` share.
 #[derive(Debug, ClapArgs)]
 pub struct EstimateArgs {
-    /// The sensor's parameters
+    /// The sensor's parameters; for smooth and live also a hand.toml
     #[arg(long, value_name = "sensor.toml")]
     pub sensor: PathBuf,
     /// Estimator: auto (the sensor file's choice), corrected, ekf, ukf, imm, sign-split or

@@ -46,7 +46,7 @@ pub fn dispatch(command: &Command, messages: &Messages) -> Result<(), CliError> 
         Command::Refine(args) => refine::run(args, messages),
         Command::FitLaw(args) => fit_law::run(args, messages),
         Command::Filter(args) => filter::run(args, messages).map(drop),
-        Command::Hand(args) => hand::run(args, messages),
+        Command::Hand(args) => hand::run(args, messages).map(drop),
         Command::Plan(args) => plan::run(args, messages),
         Command::Live(args) => live::run(args, messages),
         Command::Smooth(args) => smooth::run(args, messages).map(drop),

@@ -5,6 +5,7 @@ use ohmstrain::{Estimate, FilterBuilder, Sensor, Thermometer, ValidityWatch};
 use tempfile::SpooledTempFile;
 
 use crate::args::{Format, SmoothArgs, WrittenArgs};
+use crate::commands::hand;
 use crate::error::CliError;
 use crate::estimates::{self, EstimateWriter, Packed};
 use crate::input;
@@ -19,6 +20,9 @@ use crate::suits;
 /// the states of a few thousand rows, and one state for each further block of as many. Readings, and estimates, which are
 /// produced last segment first, wait in temporary files.
 pub fn run(args: &SmoothArgs, messages: &Messages) -> Result<u64, CliError> {
+    if sensor_file::is_of_a_hand(&args.estimate.sensor) {
+        return hand::smooth::run(args, messages);
+    }
     let wanted = args.estimate.estimator.chosen().map(|estimator| estimator.0);
     let WrittenArgs { output, replace, columns, .. } = &args.written;
     let inputs = [&args.trace_file, &args.estimate.sensor];

@@ -71,11 +71,15 @@ impl Kind {
             Self::Import => is_made_by(head, IMPORT) || is_made_by(head, SIMULATE),
             Self::Sensor => {
                 let (is_own, third) = (is_format(line()) && is_made_by_toml(line()), line());
-                let others = ["sensors = ", "sensor = ", FUSION];
-                is_own && !is_hand(head) && !others.iter().any(|other| third.starts_with(other))
+                let others = ["sensors = ", "sensor = "].into_iter().chain(FUSION);
+                is_own && !is_hand(head) && !others.into_iter().any(|other| third.starts_with(other))
             }
             Self::Hand => is_hand(head),
-            Self::Fusion => is_format(line()) && is_made_by_toml(line()) && line().starts_with(FUSION),
+            Self::Fusion => {
+                let is_own = is_format(line()) && is_made_by_toml(line());
+                let third = line();
+                is_own && FUSION.iter().any(|start| third.starts_with(start))
+            }
             Self::Protocol => is_format(line()) && is_made_by_toml(line()) && head.contains("\n[[positions]]\n"),
             Self::Prior => is_format(line()) && is_made_by_toml(line()) && line().starts_with("sensors = "),
             Self::State => is_format(line()) && is_made_by_toml(line()) && line().starts_with("sensor = "),
@@ -105,8 +109,8 @@ fn is_hand(head: &str) -> bool {
     matches!(lines[..], [format, made_by, "", "[[joints]]"] if is_format(format) && is_made_by_toml(made_by))
 }
 
-/// Third line of a fusion.
-const FUSION: &str = "sd_scale = ";
+/// Third line of a fusion, of format 2 and of format 1.
+const FUSION: [&str; 2] = ["novelty = ", "sd_scale = "];
 
 fn names_in(header: &str) -> Vec<String> {
     header.split(',').map(str::to_owned).collect()

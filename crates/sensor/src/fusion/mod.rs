@@ -17,7 +17,7 @@ use std::sync::Arc;
 pub use combine::{Member, combine};
 pub use low_passes::LowPasses;
 pub use novelty::distance;
-pub use params::{FUSION_FORMAT, FusionParams, FusionRow, MOST_CHANNELS, RegressionParams};
+pub use params::{FUSION_FORMAT, FusionErrors, FusionParams, FusionRow, MOST_CHANNELS, RegressionParams};
 pub use regression::{FusionReadings, PRIOR_SD, Regression};
 
 /// Multiple of [`FusionParams::novelty`] beyond which a row counts as unlike the calibration.
@@ -32,7 +32,7 @@ const MOST_SETS: usize = 8;
 pub struct ChannelState {
     /// ln R/R₀; NaN for a missing or implausible reading.
     pub ln_r: f64,
-    /// Strain of the channel's own filter.
+    /// Strain of the channel's own filter or smoother.
     pub own: Member,
 }
 
@@ -53,6 +53,8 @@ pub struct Fused {
 #[derive(Clone, Debug)]
 pub struct Fusion {
     params: Arc<FusionParams>,
+    /// Errors of its members.
+    errors: FusionErrors,
     low_passes: LowPasses,
     /// Regressions on sets of channels, most recently used last.
     conditioned: VecDeque<Conditioned>,
@@ -67,11 +69,23 @@ struct Conditioned {
 }
 
 impl Fusion {
-    /// Creates a fusion without any reading.
+    /// Creates a fusion of filters without any reading.
     #[must_use]
     pub fn new(params: Arc<FusionParams>) -> Self {
+        let errors = params.errors.clone();
+        Self::with_errors(params, errors)
+    }
+
+    /// Creates a fusion of smoothers; `None` if their errors are not known.
+    #[must_use]
+    pub fn of_smoothers(params: Arc<FusionParams>) -> Option<Self> {
+        let errors = params.smoothers.clone()?;
+        Some(Self::with_errors(params, errors))
+    }
+
+    fn with_errors(params: Arc<FusionParams>, errors: FusionErrors) -> Self {
         let low_passes = LowPasses::new(&params.low_pass_s, params.channels());
-        Self { params, low_passes, conditioned: VecDeque::new() }
+        Self { params, errors, low_passes, conditioned: VecDeque::new() }
     }
 
     /// Fuses the channels at a time.
@@ -94,7 +108,7 @@ impl Fusion {
         members.extend(regressions.iter().map(prediction));
         let limits = params.limits;
         let nothing = Member { strain: 0.5 * (limits.lower + limits.upper), sd: limits.span() };
-        let fused = params.fused(&members, novelty).unwrap_or(nothing);
+        let fused = params.fused(&self.errors, &members, novelty).unwrap_or(nothing);
         Fused { strain: fused.strain.clamp(limits.lower, limits.upper), sd: fused.sd, faulty, is_unlike: novelty > 0.0 }
     }
 
@@ -144,14 +158,14 @@ impl FusionParams {
         explains.map_or_else(|| (None, (all - UNLIKE).min(1.0)), |(channel, _)| (Some(channel), 0.0))
     }
 
-    /// Combines the members. With a `novelty` of the readings of 0 to 1, that share of the prior variance is added to each member
-    /// and to the result.
+    /// Combines members with these errors. With a `novelty` of the readings of 0 to 1, that share of the prior variance is added to each
+    /// member and to the result.
     #[must_use]
-    pub fn fused(&self, members: &[Member], novelty: f64) -> Option<Member> {
+    pub fn fused(&self, errors: &FusionErrors, members: &[Member], novelty: f64) -> Option<Member> {
         let prior = novelty * (PRIOR_SD * self.limits.span()).powi(2);
         let doubted = |member: &Member| Member { sd: (member.sd * member.sd + prior).sqrt(), ..*member };
         let members: Vec<Member> = members.iter().map(doubted).collect();
-        let fused = combine(&members, |i, j| self.error_covariance[i][j])?;
-        Some(Member { strain: fused.strain, sd: self.sd_scale * (fused.sd * fused.sd + prior).sqrt() })
+        let fused = combine(&members, |i, j| errors.covariance[i][j])?;
+        Some(Member { strain: fused.strain, sd: errors.sd_scale * (fused.sd * fused.sd + prior).sqrt() })
     }
 }

@@ -6,7 +6,7 @@ use crate::params::validate::FieldError;
 use crate::params::validate::table::{Allowed, FACTOR, POSITIVE, SIGNED, Table};
 
 /// Version of the fusion file this code reads and writes.
-pub const FUSION_FORMAT: u32 = 1;
+pub const FUSION_FORMAT: u32 = 2;
 /// Maximum number of channels of one strain.
 pub const MOST_CHANNELS: usize = 32;
 const COVARIANCE: Allowed = Allowed { least: -1e9, most: 1e9 };
@@ -15,7 +15,7 @@ const NOISE: Allowed = Allowed { least: 1e-4, most: 1.0 };
 
 /// Fusion of several channels of one strain: the content of a fusion file.
 ///
-/// Its members are the channels' filters, in order, and then the regressions of the strain on all readings.
+/// Its members are the channels' filters, or their smoothers, in order, and then the regressions of the strain on all readings.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FusionParams {
@@ -23,25 +23,38 @@ pub struct FusionParams {
     pub format: u32,
     /// Program and version that made it.
     pub made_by: String,
-    /// Factor on the fused standard deviation, from held-out blocks.
-    pub sd_scale: f64,
-    /// The estimated quantity.
-    pub quantity: Quantity,
-    /// Range of the output.
-    pub limits: RangeParams,
     /// 99th percentile, over rows of held-out blocks, of the squared distance per channel from the calibration's readings.
     pub novelty: f64,
     /// Typical difference of ln R of each channel between rows in which the others agree.
     pub channel_sd: Vec<f64>,
-    /// Covariances of the members' errors on held-out blocks, in units of their standard deviations, with shrunken correlations; no
-    /// variance is below one.
-    pub error_covariance: Vec<Vec<f64>>,
     /// Time constants of the low-passes of ln R, s.
     pub low_pass_s: Vec<f64>,
+    /// The estimated quantity.
+    pub quantity: Quantity,
+    /// Range of the output.
+    pub limits: RangeParams,
+    /// Errors of the channels' filters and of the regressions.
+    pub errors: FusionErrors,
+    /// Errors of the channels' filters alone, for a microcontroller; `None` if nothing was held out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub filters: Option<FusionErrors>,
+    /// Errors of the channels' smoothers and of the regressions; `None` if a channel has no smoother.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub smoothers: Option<FusionErrors>,
     /// Regressions of the strain on all channels' readings.
     pub regressions: Vec<RegressionParams>,
     /// Rows of the calibration.
     pub rows: Vec<FusionRow>,
+}
+
+/// Errors of the members of a fusion on held-out blocks.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FusionErrors {
+    /// Factor on the fused standard deviation.
+    pub sd_scale: f64,
+    /// Covariances of the errors, in units of the members' standard deviations, with shrunken correlations; no variance is below one.
+    pub covariance: Vec<Vec<f64>>,
 }
 
 /// Parameters of a Gaussian process of the strain.
@@ -75,6 +88,12 @@ impl FusionParams {
         self.channel_sd.len()
     }
 
+    /// Number of members: channels and regressions.
+    #[must_use]
+    pub const fn members(&self) -> usize {
+        self.channels() + self.regressions.len()
+    }
+
     /// Checks every number.
     ///
     /// # Errors
@@ -82,7 +101,6 @@ impl FusionParams {
     pub fn validate(&self) -> Result<(), FieldError> {
         let root = Table::root();
         self.limits.validate(&root.table("limits"))?;
-        root.number("sd_scale", self.sd_scale, FACTOR)?;
         root.number("novelty", self.novelty, POSITIVE)?;
         root.numbers("channel_sd", &self.channel_sd, POSITIVE)?;
         if !(2..=MOST_CHANNELS).contains(&self.channels()) {
@@ -92,12 +110,9 @@ impl FusionParams {
             return Err(root.wrong("rows", "at least one", 0));
         }
         root.numbers("low_pass_s", &self.low_pass_s, POSITIVE)?;
-        let members = self.channels() + self.regressions.len();
-        root.length("error_covariance", members, self.error_covariance.len())?;
-        for of_member in &self.error_covariance {
-            root.length("error_covariance", members, of_member.len())?;
-            root.numbers("error_covariance", of_member, COVARIANCE)?;
-        }
+        self.errors.validate(&root.table("errors"), self.members())?;
+        self.filters.iter().try_for_each(|errors| errors.validate(&root.table("filters"), self.channels()))?;
+        self.smoothers.iter().try_for_each(|errors| errors.validate(&root.table("smoothers"), self.members()))?;
         for (index, regression) in self.regressions.iter().enumerate() {
             regression.validate(&root.entry("regressions", index), self.low_pass_s.len())?;
         }
@@ -112,6 +127,17 @@ impl FusionParams {
         row.low_passed.iter().try_for_each(|of_channels| {
             table.length("low_passed", self.channels(), of_channels.len())?;
             table.numbers("low_passed", of_channels, SIGNED)
+        })
+    }
+}
+
+impl FusionErrors {
+    fn validate(&self, table: &Table, members: usize) -> Result<(), FieldError> {
+        table.number("sd_scale", self.sd_scale, FACTOR)?;
+        table.length("covariance", members, self.covariance.len())?;
+        self.covariance.iter().try_for_each(|of_member| {
+            table.length("covariance", members, of_member.len())?;
+            table.numbers("covariance", of_member, COVARIANCE)
         })
     }
 }

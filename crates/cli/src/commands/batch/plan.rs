@@ -8,7 +8,9 @@ use ohmstrain_sensor::EstimatorKind;
 
 use super::journal::{JOURNAL, Journal};
 use super::summary::SUMMARY;
-use crate::args::{Args, BatchArgs, BatchCommand, Command, Estimators};
+use crate::args::{Args, BatchArgs, BatchCommand, Command, Estimators, Format};
+use crate::commands::hand::description::Description;
+use crate::commands::hand::joints;
 use crate::error::CliError;
 use crate::renamed;
 use crate::sensor_file;
@@ -54,7 +56,7 @@ impl Job {
             words.extend(["-o".to_owned(), "sensor.toml".to_owned()]);
         }
         words.extend(self.flags.iter().cloned());
-        if let Some(sensor) = &self.sensor {
+        if let Some(sensor) = self.sensor.as_ref().filter(|_| args.command != BatchCommand::Hand) {
             words.extend(["--sensor".into(), sensor.display().to_string()]);
         }
         match args.command {
@@ -62,8 +64,12 @@ impl Job {
                 words.extend(["--format".to_owned(), args.format.name().to_owned()]);
             }
             BatchCommand::Evaluate | BatchCommand::Calibrate => words.push("--json".to_owned()),
+            BatchCommand::Hand => {}
         }
         words.push("--".to_owned());
+        words.extend(
+            self.sensor.iter().filter(|_| args.command == BatchCommand::Hand).map(|hand| hand.display().to_string()),
+        );
         words.extend(self.files.iter().map(|file| file.display().to_string()));
         Args::try_parse_from(words)
     }
@@ -181,6 +187,7 @@ impl ManifestRow<'_> {
 fn name_outputs(jobs: &mut [Job], args: &BatchArgs) {
     let ending = match args.command {
         BatchCommand::Filter | BatchCommand::Smooth => args.format.name(),
+        BatchCommand::Hand => Format::Csv.name(),
         BatchCommand::Evaluate => "json",
         BatchCommand::Calibrate => "toml",
     };
@@ -239,6 +246,7 @@ fn check_arguments(job: &mut Job, args: &BatchArgs) -> Result<(), CliError> {
             job.estimator = if let Estimators::One(kind) = evaluate.estimator { Some(kind) } else { None };
             (None, vec![evaluate.report.report, evaluate.report.figures])
         }
+        Command::Hand(hand) => (hand.output, vec![]),
         _ => (None, vec![]),
     };
     // Files that a manifest names lie in the folder of outputs; a name given after `--` would be written by each recording.
@@ -258,7 +266,15 @@ fn is_output(flag: &str) -> bool {
 pub fn check_sensor(jobs: &[Job], args: &BatchArgs) -> Result<(), CliError> {
     let shared = jobs.iter().filter_map(|job| job.sensor.as_ref().map(|sensor| (sensor, job.estimator)));
     let shared: HashSet<_> = shared.filter(|(sensor, _)| args.sensor.as_ref() == Some(*sensor)).collect();
-    shared.into_iter().try_for_each(|(sensor, estimator)| sensor_file::read(sensor, estimator).map(|_| ()))
+    shared.into_iter().try_for_each(|(sensor, estimator)| {
+        if args.command == BatchCommand::Hand
+            || (args.command != BatchCommand::Filter && sensor_file::is_of_a_hand(sensor))
+        {
+            joints(&Description::read(sensor)?, sensor, "").map(drop)
+        } else {
+            sensor_file::read(sensor, estimator).map(drop)
+        }
+    })
 }
 
 /// Refuses outputs that would replace each other, an input, or a file that no earlier run wrote.

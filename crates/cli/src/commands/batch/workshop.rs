@@ -12,12 +12,14 @@ use super::plan::Job;
 use super::scores::Figures;
 use crate::args::{BatchArgs, Command};
 use crate::commands::evaluate::{self, Evaluation};
+use crate::commands::hand::{self, description::Description};
 use crate::commands::{calibrate, filter, smooth};
 use crate::error::CliError;
-use crate::input::sha256_of;
+use crate::input::{sha256_of, sha256_of_all};
 use crate::messages::Messages;
 use crate::output::{Destination, UnfinishedFolder};
 use crate::printable::printable;
+use crate::sensor_file;
 use ohmstrain::MADE_BY;
 
 /// Exit code of a job that panicked.
@@ -71,12 +73,17 @@ impl<'a> Workshop<'a> {
         Ok(())
     }
 
+    /// Returns the hash of a sensor, a prior or a hand; that of a hand covers its sensors and fusions.
     fn shared_hash(&self, path: &Path) -> io::Result<String> {
         let mut known = self.shared.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(hash) = known.get(path) {
             return Ok(hash.clone());
         }
-        let hash = sha256_of(path)?;
+        let hand = sensor_file::is_of_a_hand(path).then(|| Description::read(path).ok()).flatten();
+        let hash = match hand {
+            Some(hand) => sha256_of_all(&hand.files(path))?,
+            None => sha256_of(path)?,
+        };
         known.insert(path.to_path_buf(), hash.clone());
         Ok(hash)
     }
@@ -139,6 +146,24 @@ fn run_command(command: Command, draft: &Path, entry: &mut Entry, messages: &Mes
         Command::Smooth(mut args) => {
             args.written.output = Some(draft.to_path_buf());
             entry.rows = Some(smooth::run(&args, messages)?);
+        }
+        Command::Hand(mut args) => {
+            args.output = Some(draft.to_path_buf());
+            entry.rows = Some(hand::run(&args, messages)?);
+        }
+        Command::Evaluate(args)
+            if args.calibration.sensor.as_ref().is_some_and(|path| sensor_file::is_of_a_hand(path)) =>
+        {
+            let hand = args.calibration.sensor.clone().unwrap_or_default();
+            hand::evaluate::run(&args, &hand, |name, scores| {
+                entry.rows = scores
+                    .first()
+                    .and_then(|joint| joint.fused.as_ref())
+                    .and_then(|scores| u64::try_from(scores.n).ok());
+                let mut text = Vec::new();
+                hand::scores::write(&mut text, name, scores, args.json)?;
+                fs::write(draft, text).map_err(|error| CliError::file("write", draft, &error))
+            })?;
         }
         Command::Evaluate(args) => {
             let mut evaluation = Evaluation::default();

@@ -18,6 +18,7 @@ use sensors::{JudgedSensor, Rivals, phases};
 
 use crate::args::{EvaluateArgs, Split};
 use crate::commands::hand;
+use crate::commands::hand::scores::{self as joint_scores, JointScores};
 use crate::commands::reporting::{Drawn, Reporting, Wanted};
 use crate::error::CliError;
 use crate::input;
@@ -35,7 +36,8 @@ const LEAST_COVERAGE: f64 = 0.8;
 /// Compares estimates with the reference of each recording.
 pub fn run(args: &EvaluateArgs, messages: &Messages) -> Result<(), CliError> {
     if let Some(hand) = args.calibration.sensor.as_ref().filter(|path| sensor_file::is_of_a_hand(path)) {
-        return hand::evaluate::run(args, hand);
+        let show = |name: &str, scores: &[JointScores]| print(|out| joint_scores::write(out, name, scores, args.json));
+        return hand::evaluate::run(args, hand, show);
     }
     evaluate(args, messages, &mut Evaluation::default(), |evaluation| print(|out| evaluation.write(out, args.json)))
 }

@@ -180,15 +180,19 @@ impl Group {
         }
         let name = self.name.clone();
         let Some((path, claim)) = files.fusion else {
-            let alone = calibrated.first().and_then(|one| one.findings.as_ref()).map(|findings| findings.filter);
-            let scores = JointScores { joint: name.clone(), fused: alone, channels: Vec::new() };
+            let findings = calibrated.first().and_then(|one| one.findings.as_ref());
+            let (alone, smoothed) = (findings.map(|found| found.filter), findings.and_then(|found| found.smoother));
+            let scores = JointScores { joint: name.clone(), fused: alone, smoothed, channels: Vec::new() };
             return Ok((WrittenJoint { name, only: entries.pop(), fusion: None, channels: Vec::new() }, scores));
         };
         let fused = fused(&recordings, &calibrated)?;
         outputs.put(claim, fused.sensor.to_toml()?);
         let columns = self.channels.iter().map(|channel| channel.column.clone());
-        let channels = columns.zip(fused.channels).map(|(column, alone)| ChannelScores { column, alone }).collect();
-        let scores = JointScores { joint: name.clone(), fused: fused.scores, channels };
+        let channels = columns
+            .zip(fused.channels)
+            .map(|(column, alone)| ChannelScores { column, alone, smoothed: None })
+            .collect();
+        let scores = JointScores { joint: name.clone(), fused: fused.scores, smoothed: fused.smoothed, channels };
         Ok((WrittenJoint { name, only: None, fusion: Some(path), channels: entries }, scores))
     }
 

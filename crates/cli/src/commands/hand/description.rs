@@ -103,6 +103,16 @@ fn spec<'de, D: Deserializer<'de>, T: FromStr<Err: std::fmt::Display>>(source: D
 }
 
 impl Description {
+    /// Returns the files of the hand: its own, the sensors and the fusions.
+    pub fn files(&self, hand: &Path) -> Vec<PathBuf> {
+        let folder = hand.parent().unwrap_or(Path::new(""));
+        let of_joint = |joint: &Joint| {
+            joint.channels.iter().map(|channel| channel.sensor.clone()).chain(joint.fusion.clone()).collect::<Vec<_>>()
+        };
+        let named = self.joints.iter().flat_map(of_joint).map(|path| folder.join(path));
+        std::iter::once(hand.to_path_buf()).chain(named).collect()
+    }
+
     /// Reads the file.
     ///
     /// # Errors

@@ -8,37 +8,20 @@ use ohmstrain::{Reading, ScoredRow, score};
 use ohmstrain_bench_data::Metadata;
 
 use super::description::Description;
-use super::joint::Joint;
-use super::scores::{self, ChannelScores, JointScores};
+use super::joint::{Channel, Joint, JointRow};
+use super::scores::{ChannelScores, JointScores};
+use super::{joints, refuse_flags};
 use crate::args::{Estimators, EvaluateArgs};
-use crate::channels::{Channel, Table};
+use crate::channels::{self, Table};
 use crate::error::CliError;
-use crate::output::print;
 
-/// Scores every recording with the joints of a description.
-pub fn run(args: &EvaluateArgs, hand: &Path) -> Result<(), CliError> {
-    refuse_flags(args)?;
-    let description = Description::read(hand)?;
-    let folder = hand.parent().unwrap_or(Path::new(""));
-    for path in &args.traces {
-        let Some(table) = Table::read(path)? else {
-            let what = "expected a recording with two or more columns of readings, NAME_ohm or NAME_ratio, as hand.toml names them";
-            return Err(CliError::Input(format!("{}: {what}", path.display())));
-        };
-        let name = path.display().to_string();
-        let mut joints = Vec::new();
-        for joint in &description.joints {
-            let joint = Joint::new(joint, folder, &name)?;
-            joints.push(scored(joint, &table, &args.units.metadata(), Scored::since(args.from))?);
-        }
-        print(|out| scores::write(out, &name, &joints, args.json))?;
-    }
-    Ok(())
-}
-
-/// Refuses flags that apply to one sensor only.
-fn refuse_flags(args: &EvaluateArgs) -> Result<(), CliError> {
-    let flags = [
+/// Scores every recording with the joints of a description, and passes its name and the scores to `show`.
+pub fn run(
+    args: &EvaluateArgs,
+    hand: &Path,
+    mut show: impl FnMut(&str, &[JointScores]) -> Result<(), CliError>,
+) -> Result<(), CliError> {
+    refuse_flags([
         ("--estimator", !matches!(args.estimator, Estimators::Auto)),
         ("--without", args.without.is_some()),
         ("--report", args.report.report.is_some()),
@@ -46,18 +29,28 @@ fn refuse_flags(args: &EvaluateArgs) -> Result<(), CliError> {
         ("--rest-resistance", args.rest_resistance.is_some()),
         ("--known-every", args.known_every.is_some()),
         ("--check", args.check),
-    ];
-    match flags.iter().find(|(_, is_set)| *is_set) {
-        Some((flag, _)) => Err(CliError::Arguments(format!("{flag} is for one sensor, not for a hand.toml"))),
-        None => Ok(()),
+    ])?;
+    let description = Description::read(hand)?;
+    for path in &args.traces {
+        let Some(table) = Table::read(path)? else {
+            let what = "expected a recording with two or more columns of readings, NAME_ohm or NAME_ratio, as hand.toml names them";
+            return Err(CliError::Input(format!("{}: {what}", path.display())));
+        };
+        let name = path.display().to_string();
+        let mut scores = Vec::new();
+        for joint in joints(&description, hand, &name)? {
+            scores.push(scored(joint, &table, &args.units.metadata(), Scored::since(args.from))?);
+        }
+        show(&name, &scores)?;
     }
+    Ok(())
 }
 
 /// Scores a joint on the rows of `part`; its filter starts at the first row.
 pub fn scored(mut joint: Joint, table: &Table, overrides: &Metadata, part: Scored) -> Result<JointScores, CliError> {
     let known = table.channels()?;
     let trace = |column: &str| -> Result<TraceFile, CliError> {
-        let found: Option<&Channel> = known.iter().find(|channel| channel.column == column);
+        let found: Option<&channels::Channel> = known.iter().find(|channel| channel.column == column);
         let missing = || {
             let (header, name) = (table.header_name(), joint.name);
             CliError::Input(format!("{header}: joint `{name}`: expected a column `{column}`, found none"))
@@ -68,21 +61,31 @@ pub fn scored(mut joint: Joint, table: &Table, overrides: &Metadata, part: Score
     };
     let traces: Vec<TraceFile> =
         joint.channels.iter().map(|channel| trace(&channel.entry.column)).collect::<Result<_, _>>()?;
-    let (mut fused, mut alone) = (Vec::new(), vec![Vec::new(); traces.len()]);
-    for row in 0..traces.first().map_or(0, |trace| trace.trace.len()) {
-        let time_s = traces[0].trace.time_s[row];
-        let readings: Vec<Reading> = traces.iter().map(|trace| trace.reading(row).1).collect();
-        let estimate = joint.step(time_s, &readings)?;
-        let truth = traces[0].truth(row);
-        if !part.holds(time_s) {
-            continue;
-        }
-        fused.push(ScoredRow { time_s, truth, strain: estimate.strain, sd: Some(estimate.strain_sd) });
-        for (alone, channel) in alone.iter_mut().zip(&estimate.channels) {
-            alone.push(ScoredRow { time_s, truth, strain: channel.strain, sd: Some(channel.strain_sd) });
-        }
-    }
-    let columns = joint.channels.iter().map(|channel| channel.entry.column.clone());
-    let channels = columns.zip(&alone).map(|(column, rows)| ChannelScores { column, alone: score(rows) }).collect();
-    Ok(JointScores { joint: joint.name.into(), fused: score(&fused), channels })
+    let time_s = traces.first().map_or_else(Vec::new, |trace| trace.trace.time_s.clone());
+    let readings: Vec<Vec<Reading>> =
+        traces.iter().map(|trace| (0..time_s.len()).map(|row| trace.reading(row).1).collect()).collect();
+    let step = |row: usize| {
+        let of_row: Vec<Reading> = readings.iter().map(|readings| readings[row]).collect();
+        joint.step(time_s[row], &of_row)
+    };
+    let filtered: Vec<JointRow> = (0..time_s.len()).map(step).collect::<Result<_, _>>()?;
+    // Not every estimator has a smoother.
+    let smoothed = joint.smooth(&time_s, &readings.iter().map(Vec::as_slice).collect::<Vec<_>>()).unwrap_or_default();
+    let score = |rows: &[JointRow], of: &dyn Fn(&JointRow) -> (f64, f64)| {
+        let judged = |(k, row): (usize, &JointRow)| {
+            let (strain, sd) = of(row);
+            let (time_s, truth) = (time_s[k], traces[0].truth(k));
+            part.holds(time_s).then_some(ScoredRow { time_s, truth, strain, sd: Some(sd) })
+        };
+        score(&rows.iter().enumerate().filter_map(judged).collect::<Vec<_>>())
+    };
+    let of_joint = |row: &JointRow| (row.strain, row.strain_sd);
+    let of_channel = |(k, channel): (usize, &Channel)| {
+        let of_channel = |row: &JointRow| (row.channels[k].strain, row.channels[k].strain_sd);
+        let (alone, smoothed) = (score(&filtered, &of_channel), score(&smoothed, &of_channel));
+        ChannelScores { column: channel.entry.column.clone(), alone, smoothed }
+    };
+    let channels = joint.channels.iter().enumerate().map(of_channel).collect();
+    let (fused, smoothed) = (score(&filtered, &of_joint), score(&smoothed, &of_joint));
+    Ok(JointScores { joint: joint.name.into(), fused, smoothed, channels })
 }

@@ -1,7 +1,10 @@
 use std::path::Path;
 
 use ohmstrain::trace::{self, reading_column};
-use ohmstrain::{Error, Estimate, Filter, FusedFilter, FusedSensor, Quantity, Reading, ReadingUnit, Sensor, UnitGuess};
+use ohmstrain::{
+    Error, Estimate, Filter, FilterBuilder, FusedEstimate, FusedFilter, FusedSensor, Quantity, Reading, ReadingUnit,
+    Sensor, UnitGuess,
+};
 use ohmstrain_bench_data::{LineParser, Metadata};
 
 use super::description::{Channel as Entry, Joint as Description};
@@ -30,6 +33,8 @@ pub struct Channel<'a> {
     pub joint: &'a str,
     pub entry: &'a Entry,
     pub sensor: Sensor,
+    /// Reading of the rested sensor, if it differs from that in calibration.
+    pub rest_resistance: Option<f64>,
     pub lines: LineParser,
     /// The first known readings.
     early: Vec<f64>,
@@ -70,10 +75,13 @@ impl<'a> Joint<'a> {
 
     /// Returns the endings of its columns in the output.
     pub fn endings(&self) -> [&'static str; 2] {
-        let is_strain = |channel: &Channel| {
-            channel.sensor.params().quantity == Quantity::Strain && channel.sensor.params().joint.is_none()
-        };
-        if self.channels.iter().all(is_strain) { ["_strain", "_strain_sd"] } else { ["_deg", "_sd_deg"] }
+        if self.is_strain() { ["_strain", "_strain_sd"] } else { ["_deg", "_sd_deg"] }
+    }
+
+    /// True if it reports a strain, false if an angle.
+    pub fn is_strain(&self) -> bool {
+        let params = |channel: &'_ Channel| (channel.sensor.params().quantity, channel.sensor.params().joint.is_none());
+        self.channels.iter().all(|channel| params(channel) == (Quantity::Strain, true))
     }
 
     /// Returns the quantity that its sensors were calibrated on.
@@ -88,36 +96,81 @@ impl<'a> Joint<'a> {
         Ok(())
     }
 
+    /// Restarts the filter at zero, unless the range of a sensor excludes it.
+    pub fn start_at_zero(&mut self) -> Result<(), CliError> {
+        let at_zero = |channel: &Channel| channel.builder().initial_strain(0.0).build().ok();
+        let filters: Option<Vec<Filter>> = self.channels.iter().map(at_zero).collect();
+        self.filter = match filters {
+            Some(filters) => joined(filters, self.fusion.as_ref())?,
+            None => filter(&self.channels, self.fusion.as_ref())?,
+        };
+        Ok(())
+    }
+
     /// Takes the channels' readings, and returns the joint's estimate.
     pub fn step(&mut self, time_s: f64, readings: &[Reading]) -> Result<JointRow, Error> {
         match &mut self.filter {
             JointFilter::One(filter) => {
                 let estimate = filter.step(time_s, readings.first().copied().unwrap_or(Reading::MISSING))?;
-                let flags = estimate.flags.names().map(|flag| format!("{}:{flag}", self.name)).collect();
-                let (value, sd) = angle(&estimate);
-                let (strain, strain_sd) = (estimate.strain, estimate.strain_sd);
-                Ok(JointRow { value, sd, strain, strain_sd, flags, channels: vec![estimate] })
+                Ok(self.alone(estimate))
             }
             JointFilter::Fused(filter) => {
                 let estimate = filter.step(time_s, readings)?;
-                let of_channels = self.channels.iter().zip(&estimate.channels).flat_map(|(channel, row)| {
-                    row.flags.names().map(|flag| format!("{}:{flag}", channel.entry.column))
-                });
-                let faulty = estimate.faulty.map(|channel| format!("{}:faulty", self.channels[channel].entry.column));
-                let unlike = estimate.is_unlike.then(|| format!("{}:unlike_calibration", self.name));
-                let flags = unlike.into_iter().chain(faulty).chain(of_channels).collect();
-                let value = estimate.angle_deg.unwrap_or(estimate.strain);
-                let sd = estimate.angle_sd.unwrap_or(estimate.strain_sd);
-                let (strain, strain_sd) = (estimate.strain, estimate.strain_sd);
-                Ok(JointRow { value, sd, strain, strain_sd, flags, channels: estimate.channels })
+                Ok(self.fused(estimate))
             }
         }
+    }
+
+    /// Smooths a recording; `readings` are those of each channel.
+    pub fn smooth(&self, time_s: &[f64], readings: &[&[Reading]]) -> Result<Vec<JointRow>, Error> {
+        let builders: Vec<FilterBuilder> = self.channels.iter().map(Channel::builder).collect();
+        match &self.fusion {
+            Some(fusion) => {
+                let rows = fusion.smooth_of(builders, time_s, readings)?;
+                Ok(rows.into_iter().map(|row| self.fused(row)).collect())
+            }
+            None => {
+                let of_channel =
+                    |(builder, readings): (FilterBuilder, &&[Reading])| builder.smooth_readings(time_s, readings);
+                let rows: Vec<_> = builders.into_iter().zip(readings).map(of_channel).collect::<Result<_, _>>()?;
+                Ok(rows.into_iter().flatten().map(|row| self.alone(row)).collect())
+            }
+        }
+    }
+
+    /// Returns the row of a joint with one channel.
+    fn alone(&self, estimate: Estimate) -> JointRow {
+        let flags = estimate.flags.names().map(|flag| format!("{}:{flag}", self.name)).collect();
+        let (value, sd) = angle(&estimate);
+        let (strain, strain_sd) = (estimate.strain, estimate.strain_sd);
+        JointRow { value, sd, strain, strain_sd, flags, channels: vec![estimate] }
+    }
+
+    /// Returns the row of a joint with several channels.
+    fn fused(&self, estimate: FusedEstimate) -> JointRow {
+        let of_channels = self
+            .channels
+            .iter()
+            .zip(&estimate.channels)
+            .flat_map(|(channel, row)| row.flags.names().map(|flag| format!("{}:{flag}", channel.entry.column)));
+        let faulty = estimate.faulty.map(|channel| format!("{}:faulty", self.channels[channel].entry.column));
+        let unlike = estimate.is_unlike.then(|| format!("{}:unlike_calibration", self.name));
+        let flags = unlike.into_iter().chain(faulty).chain(of_channels).collect();
+        let value = estimate.angle_deg.unwrap_or(estimate.strain);
+        let sd = estimate.angle_sd.unwrap_or(estimate.strain_sd);
+        let (strain, strain_sd) = (estimate.strain, estimate.strain_sd);
+        JointRow { value, sd, strain, strain_sd, flags, channels: estimate.channels }
     }
 }
 
 /// Creates a filter of the channels in its initial state.
 fn filter(channels: &[Channel], fusion: Option<&FusedSensor>) -> Result<JointFilter, CliError> {
-    let mut filters = channels.iter().map(Channel::filter).collect::<Result<Vec<_>, _>>()?;
+    let filters = channels.iter().map(|channel| channel.builder().build()).collect::<Result<Vec<_>, _>>()?;
+    joined(filters, fusion)
+}
+
+/// Joins the filters of a joint's channels.
+fn joined(mut filters: Vec<Filter>, fusion: Option<&FusedSensor>) -> Result<JointFilter, CliError> {
     match (fusion, filters.pop()) {
         (None, Some(only)) => Ok(JointFilter::One(Box::new(only))),
         (Some(fusion), Some(last)) => {
@@ -151,12 +204,13 @@ impl<'a> Channel<'a> {
             sensor.check_rest_resistance(measured).map_err(refused)?;
         }
         let lines = LineParser::new(file, Metadata { front_end: entry.front_end, ..Metadata::default() });
-        Ok(Self { joint: &joint.name, entry, sensor, lines, early: vec![] })
+        let rest_resistance = entry.rest_resistance;
+        Ok(Self { joint: &joint.name, entry, sensor, rest_resistance, lines, early: vec![] })
     }
 
-    fn filter(&self) -> Result<Filter, Error> {
+    fn builder(&self) -> FilterBuilder<'_> {
         let wanted = self.sensor.filter();
-        self.entry.rest_resistance.map_or(wanted, |measured| wanted.rest_resistance(measured)).build()
+        self.rest_resistance.map_or(wanted, |measured| wanted.rest_resistance(measured))
     }
 
     /// Returns the header for this channel: its column is the reading, those of other channels are ignored.
@@ -214,7 +268,7 @@ impl<'a> Channel<'a> {
     }
 
     fn unit_doubt(&self) -> Option<String> {
-        let doubt = self.sensor.check_unit(self.early.iter().copied(), self.entry.rest_resistance).err()?;
+        let doubt = self.sensor.check_unit(self.early.iter().copied(), self.rest_resistance).err()?;
         let answer = match doubt.guess {
             UnitGuess::KiloOhm => "Then say so with a line `# resistance_unit = kohm` above the header",
             UnitGuess::CalibrationInKiloOhm => "Then calibrate again with `--unit resistance=kohm`",

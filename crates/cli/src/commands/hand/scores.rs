@@ -13,6 +13,8 @@ pub struct JointScores {
     pub joint: String,
     /// Scores of the joint's estimate as `hand` reports it.
     pub fused: Option<Scores>,
+    /// Scores of the smoothed estimate; `None` without a smoother.
+    pub smoothed: Option<Scores>,
     pub channels: Vec<ChannelScores>,
 }
 
@@ -22,6 +24,9 @@ pub struct ChannelScores {
     /// Column of its readings.
     pub column: String,
     pub alone: Option<Scores>,
+    /// Scores of its smoother; `None` without one, or on the parts left out of a calibration.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub smoothed: Option<Scores>,
 }
 
 /// Prints scores below a heading, as JSON or as a table.
@@ -32,13 +37,13 @@ pub fn write(out: &mut dyn Write, heading: &str, joints: &[JointScores], is_json
         return Ok(writeln!(out)?);
     }
     let mut table = score_table();
-    for JointScores { joint, fused, channels } in joints {
-        if let Some(scores) = fused {
-            add_scores(&mut table, joint, scores);
-        }
+    for JointScores { joint, fused, smoothed, channels } in joints {
+        fused.iter().for_each(|scores| add_scores(&mut table, joint, scores));
+        smoothed.iter().for_each(|scores| add_scores(&mut table, &format!("{joint}, smoothed"), scores));
         let alone = channels.iter().filter(|_| channels.len() > 1);
-        for ChannelScores { column, alone } in alone {
+        for ChannelScores { column, alone, smoothed } in alone {
             alone.iter().for_each(|scores| add_scores(&mut table, &format!("  {column} alone"), scores));
+            smoothed.iter().for_each(|scores| add_scores(&mut table, &format!("  {column} alone, smoothed"), scores));
         }
     }
     Ok(writeln!(out, "{heading}\n\n{table}\n\n{KEY}")?)

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use ohmstrain_bench_data::{LineParser, ReadingKind, ReferenceQuantity, Row, RowWriter};
+use ohmstrain_bench_data::{Metadata, RowWriter, counted};
 
 use ohmstrain::MADE_BY;
 
@@ -18,56 +18,61 @@ pub struct Recorder {
     pub path: PathBuf,
     /// Number of rows so far.
     pub count: u64,
-    has_codes: bool,
-    has_reference: bool,
 }
 
 impl Recorder {
-    /// Begins the first file `PREFIX-N.csv` that does not exist yet, with the header and metadata of `lines`.
+    /// Begins the first file `PREFIX-N.csv` that does not exist yet, with the metadata of the stream and these columns between the time
+    /// and the marks.
     ///
     /// # Errors
     /// If no file can be created.
-    pub fn begin(prefix: &Path, lines: &LineParser) -> io::Result<Self> {
+    pub fn begin<'c>(
+        prefix: &Path,
+        mut metadata: Metadata,
+        columns: impl Iterator<Item = &'c str>,
+    ) -> io::Result<Self> {
         let (path, mut file) = new_file(prefix)?;
         // The maker of a recording that is played back did not make this one.
-        let mut metadata = lines.metadata();
         metadata.other.retain(|(key, _)| key != "made_by");
         write!(file, "# made_by = {MADE_BY} live\n{metadata}")?;
         let mut rows = RowWriter::new(BufWriter::new(file));
-        let reading = match (lines.has_codes(), lines.reading_kind()) {
-            (true, _) => "adc",
-            (_, Some(ReadingKind::Ratio)) => "resistance_ratio",
-            _ => "resistance_ohm",
-        };
-        let reference = lines.reference_quantity().map(|quantity| match quantity {
-            ReferenceQuantity::Strain => "strain",
-            ReferenceQuantity::AngleDeg => "angle_deg",
-        });
-        ["time_s", reading].into_iter().chain(reference).chain(["mark"]).for_each(|name| rows.text(name));
+        std::iter::once("time_s").chain(columns).chain(["mark"]).for_each(|name| rows.text(name));
         rows.end()?;
         rows.flush()?;
-        Ok(Self { rows, path, count: 0, has_codes: lines.has_codes(), has_reference: reference.is_some() })
+        Ok(Self { rows, path, count: 0 })
     }
 
     /// Writes a row, and the number of its mark, if it has one.
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn write(&mut self, row: &Row, mark: Option<u32>) -> io::Result<()> {
-        self.rows.number(row.time_s);
-        match row.reading.code {
-            Some(code) if self.has_codes => self.rows.number(f64::from(code)),
-            _ if self.has_codes => self.rows.number(f64::NAN),
-            _ => self.rows.number(row.reading.value),
-        }
-        if self.has_reference {
-            self.rows.number(row.reference);
-        }
+    pub fn write(&mut self, time_s: f64, values: impl Iterator<Item = f64>, mark: Option<u32>) -> io::Result<()> {
+        self.rows.number(time_s);
+        values.for_each(|value| self.rows.number(value));
         self.rows.number(mark.map_or(f64::NAN, f64::from));
         self.count += 1;
         self.rows.end()?;
         // Flushed, so that the file has whole rows however the program ends.
         self.rows.flush()
+    }
+}
+
+/// Stops a recording, or begins one; returns it with a message.
+pub fn toggled(
+    recorder: Option<Recorder>,
+    has_rows: bool,
+    begin: impl FnOnce() -> io::Result<Recorder>,
+) -> (Option<Recorder>, String) {
+    match recorder {
+        Some(recorder) => (None, format!("recorded {} ({})", recorder.path.display(), counted(recorder.count, "row"))),
+        None if !has_rows => (None, "there is nothing to record yet".into()),
+        None => match begin() {
+            Ok(recorder) => {
+                let message = format!("recording to {}", recorder.path.display());
+                (Some(recorder), message)
+            }
+            Err(error) => (None, format!("cannot record: {error}")),
+        },
     }
 }
 

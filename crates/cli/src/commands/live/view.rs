@@ -10,6 +10,8 @@ use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Axis, Block, Chart, Dataset, GraphType, Paragraph, Wrap};
 
+use super::pulse::Pulse;
+use super::recorder::Recorder;
 use super::session::Session;
 use crate::args::LiveArgs;
 use crate::printable::printable;
@@ -21,30 +23,46 @@ const PLOT_HEIGHT: u16 = 6;
 /// Height in rows below which a terminal counts as low.
 const LOW: u16 = 10;
 /// Largest number of points drawn: a few per dot of a wide terminal.
-const MOST_DRAWN: usize = 2000;
+pub const MOST_DRAWN: usize = 2000;
 /// Width of a bar that stands for a probability.
 const BAR: usize = 10;
 
 /// Draws everything.
 pub fn draw(frame: &mut Frame, session: &Session, status: &str, args: &LiveArgs) {
-    // A low terminal has room for the numbers, and for messages in place of the keys.
-    let is_low = frame.area().height < LOW;
-    let message_height = if session.message.is_empty() { 0 } else { 1 };
-    let (message, keys) = if is_low { (message_height, 1 - message_height) } else { (2, 1) };
-    let rows = [Constraint::Length(1), Constraint::Min(0), Constraint::Length(message), Constraint::Length(keys)];
-    let [title, middle, message, keys] = Layout::vertical(rows).areas(frame.area());
-    let sensor = args.estimate.sensor.file_name().unwrap_or_default().to_string_lossy();
-    let heading = format!("ohmstrain live · {} · {sensor} · {status}", args.port.source());
-    frame.render_widget(Paragraph::new(printable(&heading)).bold(), title);
-    frame.render_widget(Paragraph::new(printable(&session.message)).wrap(Wrap { trim: true }), message);
-    frame.render_widget(Paragraph::new("z zero at rest   r record   m mark   q quit").dim(), keys);
-    let numbers = numbers(session);
-    if middle.width >= NUMBERS_WIDTH + PLOT_WIDTH && middle.height >= PLOT_HEIGHT {
-        let [left, right] = Layout::horizontal([Constraint::Min(0), Constraint::Length(NUMBERS_WIDTH)]).areas(middle);
-        draw_plot(frame, session, args.window_s, left);
-        frame.render_widget(Paragraph::new(numbers).block(Block::bordered()), right);
-    } else {
-        frame.render_widget(Paragraph::new(numbers), middle);
+    let around = Around { args, status, message: &session.message };
+    around.draw(frame, numbers(session), |frame, area| draw_plot(frame, session, args.window_s, area));
+}
+
+/// Text around a plot.
+pub struct Around<'a> {
+    pub args: &'a LiveArgs,
+    /// State of the port.
+    pub status: &'a str,
+    pub message: &'a str,
+}
+
+impl Around<'_> {
+    /// Draws title, message and keys, and between them the numbers, beside the plot if there is room for one.
+    pub fn draw(&self, frame: &mut Frame, numbers: Vec<Line>, plot: impl FnOnce(&mut Frame, Rect)) {
+        // A low terminal has room for the numbers, and for messages in place of the keys.
+        let is_low = frame.area().height < LOW;
+        let message_height = if self.message.is_empty() { 0 } else { 1 };
+        let (message, keys) = if is_low { (message_height, 1 - message_height) } else { (2, 1) };
+        let rows = [Constraint::Length(1), Constraint::Min(0), Constraint::Length(message), Constraint::Length(keys)];
+        let [title, middle, message, keys] = Layout::vertical(rows).areas(frame.area());
+        let sensor = self.args.estimate.sensor.file_name().unwrap_or_default().to_string_lossy();
+        let heading = format!("ohmstrain live · {} · {sensor} · {}", self.args.port.source(), self.status);
+        frame.render_widget(Paragraph::new(printable(&heading)).bold(), title);
+        frame.render_widget(Paragraph::new(printable(self.message)).wrap(Wrap { trim: true }), message);
+        frame.render_widget(Paragraph::new("z zero at rest   r record   m mark   q quit").dim(), keys);
+        if middle.width >= NUMBERS_WIDTH + PLOT_WIDTH && middle.height >= PLOT_HEIGHT {
+            let columns = [Constraint::Min(0), Constraint::Length(NUMBERS_WIDTH)];
+            let [left, right] = Layout::horizontal(columns).areas(middle);
+            plot(frame, left);
+            frame.render_widget(Paragraph::new(numbers).block(Block::bordered()), right);
+        } else {
+            frame.render_widget(Paragraph::new(numbers), middle);
+        }
     }
 }
 
@@ -63,27 +81,32 @@ fn draw_plot(frame: &mut Frame, session: &Session, window_s: f64, area: Rect) {
     let margin = 0.05 * limits.span();
     let y = [factor * (limits.lower - margin), factor * (limits.upper + margin)];
     let marks: Vec<(f64, f64)> = session.marks.iter().map(|mark_s| (*mark_s, y[0])).collect();
-    let dataset = |data, colour, kind| {
-        let style = Style::default().fg(colour);
-        Dataset::default().marker(Marker::Braille).graph_type(kind).style(style).data(data)
-    };
     let datasets = vec![
         dataset(&upper, Color::DarkGray, GraphType::Line),
         dataset(&lower, Color::DarkGray, GraphType::Line),
         dataset(&mean, Color::Cyan, GraphType::Line),
         dataset(&marks, Color::Yellow, GraphType::Scatter).marker(Marker::Block),
     ];
-    let labels = |[low, high]: [f64; 2]| [low, 0.5 * (low + high), high].map(|x| Line::from(format!("{x:.1}")));
     let name = match session.sensor().params().quantity {
         Quantity::Strain => "strain",
         Quantity::AngleDeg => "angle",
     };
     let title = format!(" {name},{unit}, with its 95 % interval; time, s ");
-    let chart = Chart::new(datasets)
+    frame.render_widget(chart(datasets, title, x, y), area);
+}
+
+/// Returns a line, or dots, of a chart.
+pub fn dataset(data: &[(f64, f64)], colour: Color, kind: GraphType) -> Dataset<'_> {
+    Dataset::default().marker(Marker::Braille).graph_type(kind).style(Style::default().fg(colour)).data(data)
+}
+
+/// Returns a chart with these bounds.
+pub fn chart<'a>(datasets: Vec<Dataset<'a>>, title: String, x: [f64; 2], y: [f64; 2]) -> Chart<'a> {
+    let labels = |[low, high]: [f64; 2]| [low, 0.5 * (low + high), high].map(|x| Line::from(format!("{x:.1}")));
+    Chart::new(datasets)
         .block(Block::bordered().title(title))
         .x_axis(Axis::default().bounds(x).labels(labels(x)))
-        .y_axis(Axis::default().bounds(y).labels(labels(y)));
-    frame.render_widget(chart, area);
+        .y_axis(Axis::default().bounds(y).labels(labels(y)))
 }
 
 fn numbers(session: &Session) -> Vec<Line<'static>> {
@@ -91,7 +114,7 @@ fn numbers(session: &Session) -> Vec<Line<'static>> {
     let mut line =
         |name: &str, text: String| lines.push(Line::from(vec![Span::from(format!("{name:<11}")).dim(), text.into()]));
     // The numbers below are equally old.
-    if let Some(silent_s) = session.silent_s() {
+    if let Some(silent_s) = session.pulse.silent_s() {
         line("silent", format!("for {silent_s:.0} s"));
     }
     if let Some(row) = &session.last {
@@ -99,14 +122,19 @@ fn numbers(session: &Session) -> Vec<Line<'static>> {
     } else {
         line("", "no reading yet".into());
     }
-    let counts = &session.counts;
-    let rate = session.rate_hz().map_or_else(String::new, |hz| format!(" at {hz:.1}/s"));
+    of_stream(&session.pulse, session.recorder.as_ref(), &mut line);
+    lines
+}
+
+/// Lists the counts of a stream.
+pub fn of_stream(pulse: &Pulse, recorder: Option<&Recorder>, line: &mut impl FnMut(&str, String)) {
+    let counts = &pulse.counts;
+    let rate = pulse.rate_hz().map_or_else(String::new, |hz| format!(" at {hz:.1}/s"));
     line("rows", format!("{}{rate}", counts.rows));
     line("drop-outs", format!("{} missing, {}", counts.missing, counted(counts.gaps, "gap")));
     line("skipped", counted(counts.bad_lines, "line"));
-    line("record", session.recorder.as_ref().map_or("off".into(), |recorder| counted(recorder.count, "row")));
+    line("record", recorder.map_or("off".into(), |recorder| counted(recorder.count, "row")));
     line("marks", counts.marks.to_string());
-    lines
 }
 
 fn of_estimate(session: &Session, row: &Estimate, line: &mut impl FnMut(&str, String)) {

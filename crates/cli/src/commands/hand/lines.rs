@@ -1,0 +1,163 @@
+//! Lines of a recording of several channels: each channel parses every line under a header in which its own column is the reading.
+
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+
+use ohmstrain_bench_data::{Line, Row};
+
+use super::joint::{Channel, Joint};
+use crate::error::CliError;
+use crate::whole_file::is_stdin;
+
+/// Advice for a clock that has restarted.
+const LATE: &str = "; if the clock has started again there, --skip-bad goes on with other filters";
+
+/// Longest line, bytes; anything longer is not a row.
+const LONGEST_LINE: u64 = 64 * 1024;
+
+/// Result of a line.
+#[derive(Default)]
+pub struct Taken {
+    /// A row of each channel; empty for any other line.
+    pub rows: Vec<Row>,
+    /// True for the first header.
+    pub is_first: bool,
+    /// True if the clock has restarted.
+    pub restarted: bool,
+    /// Reason why a channel cannot read the line.
+    pub refused: Option<String>,
+}
+
+/// Parser of all channels' lines.
+#[derive(Default)]
+pub struct HandParser {
+    header: Option<String>,
+    /// True if the header may come again, from a device that has restarted.
+    repeats: bool,
+}
+
+impl HandParser {
+    /// Creates a parser that waits for a header.
+    pub fn new(repeats: bool) -> Self {
+        Self { header: None, repeats }
+    }
+
+    /// True once the header is known.
+    pub const fn has_header(&self) -> bool {
+        self.header.is_some()
+    }
+
+    /// Parses a line; `place` is its place in messages.
+    ///
+    /// # Errors
+    /// If a header lacks a channel's column.
+    pub fn take(&mut self, line: &[u8], place: &str, joints: &mut [Joint]) -> Result<Taken, CliError> {
+        let text = String::from_utf8_lossy(line);
+        let is_first = self.header.is_none() && !text.starts_with('#') && !text.trim().is_empty();
+        let is_header = is_first || (self.repeats && self.header.as_deref() == Some(text.trim()));
+        let mut taken = Taken { is_first, restarted: is_header && !is_first, ..Taken::default() };
+        for channel in channels(joints) {
+            let result = if is_header {
+                let own = channel.header(text.trim());
+                let own = own.map_err(|what| CliError::Input(format!("{place}: {what}")))?;
+                channel.lines.take(own.as_bytes())
+            } else {
+                channel.lines.take(line)
+            };
+            match result {
+                Ok(Line::Row(row)) => taken.rows.push(row),
+                Ok(Line::Restarted(row)) => {
+                    taken.rows.push(row);
+                    taken.restarted = true;
+                }
+                Ok(_) => {}
+                Err(fault) => {
+                    let hint = if fault.is_late { LATE } else { "" };
+                    taken.refused = Some(format!("joint `{}`: {fault}{hint}", channel.joint));
+                }
+            }
+        }
+        if is_first {
+            self.header = Some(text.trim().to_owned());
+        }
+        // A line that one channel cannot read is a row for none.
+        if taken.refused.is_some() || taken.rows.len() < channels(joints).count() {
+            taken.rows.clear();
+        }
+        Ok(taken)
+    }
+}
+
+/// Returns the channels of all joints.
+pub fn channels<'j, 'a: 'j>(joints: &'j mut [Joint<'a>]) -> impl Iterator<Item = &'j mut Channel<'a>> {
+    joints.iter_mut().flat_map(|joint| &mut joint.channels)
+}
+
+/// Lines of a recording or of standard input.
+pub struct HandLines {
+    path: PathBuf,
+    /// Its name in messages.
+    pub file: String,
+    /// True if a reader waits for each row.
+    pub is_live: bool,
+    source: BufReader<Box<dyn Read>>,
+    line: Vec<u8>,
+    /// Number of the last line.
+    number: u64,
+    parser: HandParser,
+}
+
+impl HandLines {
+    /// Opens a recording, or standard input.
+    ///
+    /// # Errors
+    /// If it cannot be read.
+    pub fn open(path: &Path, repeats: bool) -> Result<Self, CliError> {
+        let (file, source): (String, Box<dyn Read>) = if is_stdin(path) {
+            ("stdin".into(), Box::new(io::stdin()))
+        } else {
+            let file = File::open(path).map_err(|error| CliError::file("read", path, &error))?;
+            (path.display().to_string(), Box::new(file))
+        };
+        Ok(Self {
+            path: path.into(),
+            file,
+            is_live: is_stdin(path) || !path.is_file(),
+            source: BufReader::new(source),
+            line: Vec::new(),
+            number: 0,
+            parser: HandParser::new(repeats),
+        })
+    }
+
+    /// Returns the place of the last line.
+    pub fn place(&self) -> String {
+        format!("{}:{}", self.file, self.number)
+    }
+
+    /// Parses the next line; `None` at the end.
+    ///
+    /// # Errors
+    /// If it cannot be read, or a header lacks a channel's column.
+    pub fn next(&mut self, joints: &mut [Joint]) -> Result<Option<Taken>, CliError> {
+        let unreadable = |error| CliError::file("read", &self.path, &error);
+        if self.line.len() as u64 == LONGEST_LINE && !self.line.ends_with(b"\n") {
+            self.source.skip_until(b'\n').map_err(unreadable)?;
+        }
+        self.line.clear();
+        let mut limited = (&mut self.source).take(LONGEST_LINE);
+        if limited.read_until(b'\n', &mut self.line).map_err(unreadable)? == 0 {
+            return Ok(None);
+        }
+        self.number += 1;
+        let place = self.place();
+        self.parser.take(&self.line, &place, joints).map(Some)
+    }
+
+    /// Returns the error of a recording without a row.
+    pub fn no_row(&self) -> CliError {
+        let none = "expected at least one row of data, found the end of the file";
+        CliError::Input(format!("{}:{}: {none}", self.file, self.number + 1))
+    }
+}

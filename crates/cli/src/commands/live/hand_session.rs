@@ -1,0 +1,240 @@
+//! State of the view of several joints: their filters, and the lines so far.
+
+use std::collections::VecDeque;
+use std::io;
+use std::time::Instant;
+
+use ohmstrain_bench_data::{Metadata, Row};
+use ratatui::Frame;
+
+use super::pulse::{Counts, Pulse};
+use super::recorder::{self, Recorder};
+use super::session::{LEAST_AT_REST, MOST_POINTS, REST_S, recorded};
+use super::{Shown, hand_view};
+use crate::args::LiveArgs;
+use crate::commands::hand::description::Description;
+use crate::commands::hand::joint::{Joint, JointRow};
+use crate::commands::hand::lines::{HandParser, channels};
+use crate::commands::hand::{joints, refuse_estimate, refuse_flags, step};
+use crate::error::CliError;
+use crate::port::{Due, Headed, Taker};
+use crate::run::median;
+
+/// Row of the plot.
+pub struct HandPoint {
+    pub time_s: f64,
+    /// Reading of each channel; NaN where it is missing.
+    readings: Vec<f64>,
+    /// Value of each joint, degrees or strain.
+    pub values: Vec<f64>,
+}
+
+/// Filters of all joints on a stream of lines.
+pub struct HandSession<'a> {
+    pub args: &'a LiveArgs,
+    pub joints: Vec<Joint<'a>>,
+    parser: HandParser,
+    headed: Headed,
+    new_mark: Option<u32>,
+    pub points: VecDeque<HandPoint>,
+    /// Times of the marks, s.
+    pub marks: VecDeque<f64>,
+    /// Estimate of each joint in the last row.
+    pub last: Vec<JointRow>,
+    pub pulse: Pulse,
+    pub recorder: Option<Recorder>,
+    /// Last message.
+    pub message: String,
+}
+
+impl<'a> HandSession<'a> {
+    /// Creates a session that waits for a header, unless the flags contain it.
+    ///
+    /// # Errors
+    /// If a file cannot be read, the header lacks a column, or a flag is for one sensor.
+    pub fn new(args: &'a LiveArgs, description: &'a Description) -> Result<Self, CliError> {
+        refuse_estimate(&args.estimate)?;
+        refuse_flags([
+            ("--gauge-length-mm", args.setup.gauge_length_mm.is_some()),
+            ("--front-end", args.setup.front_end.is_some()),
+            ("--joint", args.setup.joint.is_some()),
+        ])?;
+        let mut joints = joints(description, &args.estimate.sensor, &args.port.source())?;
+        let (mut parser, headed) = (HandParser::new(true), Headed::new(args.port.header.as_deref()));
+        if let Some(header) = headed.header() {
+            parser.take(header.as_bytes(), "--header", &mut joints)?;
+        }
+        Ok(Self {
+            args,
+            joints,
+            parser,
+            headed,
+            new_mark: None,
+            points: VecDeque::new(),
+            marks: VecDeque::new(),
+            last: Vec::new(),
+            pulse: Pulse::default(),
+            recorder: None,
+            message: String::new(),
+        })
+    }
+
+    /// Restarts everything that depends on time, after the clock has restarted.
+    fn restart(&mut self) -> Result<(), CliError> {
+        self.pulse.counts.restarts += 1;
+        self.joints.iter_mut().try_for_each(Joint::restart)?;
+        self.pulse.restart();
+        self.points.clear();
+        self.marks.clear();
+        self.message = "the clock has started again, and so have the filters".into();
+        if self.recorder.is_some() {
+            self.toggle_record();
+            self.toggle_record();
+        }
+        Ok(())
+    }
+
+    /// Begins a recording of all channels' readings, as codes where they are.
+    fn new_recorder(&self) -> io::Result<Recorder> {
+        let all = || self.joints.iter().flat_map(|joint| &joint.channels);
+        let metadata = all().next().map_or_else(Metadata::default, |channel| channel.lines.metadata());
+        // The electronics of each channel are in hand.toml.
+        let metadata = Metadata { front_end: None, ..metadata };
+        Recorder::begin(&self.args.record, metadata, all().map(|channel| channel.entry.column.as_str()))
+    }
+
+    fn record(&mut self, rows: &[Row]) {
+        let mark = self.new_mark.take();
+        let Some(recorder) = &mut self.recorder else { return };
+        let readings =
+            channels(&mut self.joints).zip(rows).map(|(channel, row)| recorded(row, channel.lines.has_codes()));
+        if let Err(error) = recorder.write(rows[0].time_s, readings, mark) {
+            self.message = format!("cannot record: {error}");
+            self.recorder = None;
+        }
+    }
+
+    /// Returns the median of a channel's readings in the last second, or of the last few.
+    fn rested(&self, channel: usize) -> Option<f64> {
+        let last_s = self.points.back()?.time_s;
+        let known = || self.points.iter().rev().filter(|point| point.readings[channel].is_finite());
+        let recent: Vec<f64> =
+            known().take_while(|point| point.time_s >= last_s - REST_S).map(|point| point.readings[channel]).collect();
+        let few = || known().take(LEAST_AT_REST).map(|point| point.readings[channel]).collect();
+        median(if recent.len() < LEAST_AT_REST { few() } else { recent })
+    }
+}
+
+impl Taker for HandSession<'_> {
+    type Row = Vec<Row>;
+
+    fn parse(&mut self, line: &[u8], arrived: Instant) -> Result<Option<Due<Vec<Row>>>, CliError> {
+        let line = self.headed.line(line, arrived);
+        let had_header = self.parser.has_header();
+        let taken = match self.parser.take(&line, &self.args.port.source(), &mut self.joints) {
+            Ok(taken) => taken,
+            // The rest of a line, as after opening a port late, is not a header.
+            Err(CliError::Input(what)) if !had_header => {
+                self.pulse.counts.bad_lines += 1;
+                self.message = what;
+                return Ok(None);
+            }
+            Err(error) => return Err(error),
+        };
+        if let Some(refused) = taken.refused {
+            self.pulse.counts.bad_lines += 1;
+            self.message = format!("skipped {refused}");
+        }
+        let Some(first) = taken.rows.first() else {
+            // A header that comes again is a device that has restarted.
+            if taken.restarted && self.pulse.counts.rows > 0 {
+                self.restart()?;
+            }
+            return Ok(None);
+        };
+        Ok(Some(Due { time_s: first.time_s, restarted: taken.restarted, row: taken.rows }))
+    }
+
+    fn take(&mut self, due: Due<Vec<Row>>) -> Result<(), CliError> {
+        if due.restarted {
+            self.restart()?;
+        }
+        let rows = due.row;
+        self.last = match step(&mut self.joints, &rows) {
+            Ok(estimates) => estimates,
+            Err(error) => {
+                self.pulse.counts.bad_lines += 1;
+                self.message = error.to_string();
+                return Ok(());
+            }
+        };
+        let missing = rows.iter().filter(|row| !row.reading.value.is_finite()).count();
+        self.pulse.count(due.time_s, missing as u64);
+        let readings: Vec<f64> = rows.iter().map(|row| row.reading.value).collect();
+        for (channel, reading) in channels(&mut self.joints).zip(&readings) {
+            channel.doubt(*reading).into_iter().for_each(|doubt| self.message = doubt);
+        }
+        let values = self.last.iter().map(|row| row.value).collect();
+        self.points.push_back(HandPoint { time_s: due.time_s, readings, values });
+        let oldest_s = due.time_s - self.args.window_s.max(REST_S);
+        while self.points.len() > MOST_POINTS || self.points.front().is_some_and(|point| point.time_s < oldest_s) {
+            self.points.pop_front();
+        }
+        while self.marks.front().is_some_and(|mark_s| *mark_s < oldest_s) {
+            self.marks.pop_front();
+        }
+        self.record(&rows);
+        Ok(())
+    }
+}
+
+impl Shown for HandSession<'_> {
+    /// Makes the readings R₀ of each channel, and all strains zero.
+    fn zero(&mut self) -> Result<(), CliError> {
+        let count = channels(&mut self.joints).count();
+        let rested: Vec<Option<f64>> = (0..count).map(|channel| self.rested(channel)).collect();
+        let mut refused = Vec::new();
+        for (channel, rested) in channels(&mut self.joints).zip(rested) {
+            let Some(rested) = rested else { continue };
+            match channel.sensor.check_rest_resistance(rested) {
+                Ok(()) => channel.rest_resistance = Some(rested),
+                Err(error) => refused.push(format!("{}: R0 stays as it was: {error}", channel.entry.column)),
+            }
+        }
+        self.joints.iter_mut().try_for_each(Joint::start_at_zero)?;
+        self.message = if refused.is_empty() {
+            "R0 of each channel is its median of the last second".into()
+        } else {
+            refused.join("; ")
+        };
+        Ok(())
+    }
+
+    fn mark(&mut self) {
+        let Some(last) = self.points.back() else { return };
+        self.pulse.counts.marks += 1;
+        self.new_mark = Some(self.pulse.counts.marks);
+        self.marks.push_back(last.time_s);
+        self.message = format!("mark {} at {:.2} s", self.pulse.counts.marks, last.time_s);
+    }
+
+    fn toggle_record(&mut self) {
+        let has_rows = self.pulse.counts.rows > 0;
+        (self.recorder, self.message) = recorder::toggled(self.recorder.take(), has_rows, || self.new_recorder());
+    }
+
+    fn draw(&self, frame: &mut Frame, status: &str) {
+        hand_view::draw(frame, self, status);
+    }
+
+    fn counts(&self) -> Counts {
+        self.pulse.counts
+    }
+
+    fn recording(&mut self) -> Option<String> {
+        self.recorder.is_some().then(|| {
+            self.toggle_record();
+            self.message.clone()
+        })
+    }
+}
