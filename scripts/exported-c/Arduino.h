@@ -6,6 +6,9 @@
 #include <stdint.h>
 
 #define A0 14
+#define A1 15
+#define A2 16
+#define A3 17
 
 int analogRead(uint8_t pin);
 uint32_t analogReadMilliVolts(uint8_t pin);
@@ -18,6 +21,7 @@ struct SerialPort {
   int available();
   int read();
   void print(const char *text);
+  void print(char letter);
   void print(unsigned long number);
   void print(double number, int digits);
   void println(const char *text);

@@ -6,8 +6,7 @@ use crate::error::CliError;
 use crate::whole_file;
 
 /// Message for a file that describes a hand where a sensor is expected.
-pub const A_HAND: &str =
-    "is the description of a hand, not of a sensor: give it to `ohmstrain hand`, or to `smooth`, `live` or `evaluate`";
+pub const A_HAND: &str = "is the description of a hand, not of a sensor: give it to `ohmstrain hand`, or to `smooth`, `live`, `evaluate` or `export`";
 
 /// Reads a sensor and checks that the estimator, or the file's default one, can be built from it.
 pub fn read(path: &Path, estimator: Option<EstimatorKind>) -> Result<Sensor, CliError> {

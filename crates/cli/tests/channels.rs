@@ -1,6 +1,7 @@
 //! A recording of several channels: calibrated, fused, evaluated and filtered in one command each.
 
 use crate::common::{Bench, Csv, change_rows};
+use crate::export::{compile_and_run, compilers};
 
 /// Names of the channels.
 const CHANNELS: [&str; 3] = ["inner", "middle", "outer"];
@@ -87,6 +88,48 @@ fn channels_of_one_strain_are_fused() {
     bench.run(&["calibrate", "knee.csv", "--until", UNTIL, "-o", "knee.toml", "--estimator", "ekf", "--quiet"]).ok();
     let after: Vec<String> = ["knee.toml", "knee-fusion.toml", "knee-outer.toml"].map(|name| bench.read(name)).into();
     assert_eq!(before, after);
+}
+
+/// The exported C over the same recording: with all channels, and with one unplugged for a while, when the processes of all readings rest.
+#[test]
+fn a_fused_joint_is_exported() {
+    let bench = bench();
+    let export = ["export", "--sensor", "knee.toml", "--target", "c", "-o", "out", "--dt-s", "0.1"];
+    let printed = bench.run(&export).ok();
+    assert!(printed.contains("filters of 3 channels: ") && printed.contains("fusion of `knee`: "), "{printed}");
+    // An earlier export is replaced silently.
+    assert_eq!(bench.run(&export).ok(), printed);
+    let unplugged = change_rows(&bench.read("knee.csv"), |_, cells| {
+        if cells[0].parse::<f64>().is_ok_and(|time_s| (120.0..125.0).contains(&time_s)) {
+            cells[1].clear();
+        }
+    });
+    let sources = ["src/ohmstrain.c", "src/inner.c", "src/middle.c", "src/outer.c", "selftest/replay.c"];
+    for compiler in compilers() {
+        let shown = compile_and_run(compiler, &bench.path("out"), &sources, &unplugged);
+        let chip = Csv::new(&shown);
+        bench.write("unplugged.csv", &unplugged);
+        let computer = Csv::new(&bench.run(&["hand", "knee.toml", "unplugged.csv"]).ok());
+        assert_eq!(chip.header, "time_s,knee_strain,knee_strain_sd,knee_flags");
+        let (values, deviations) = (computer.numbers("knee_strain"), computer.numbers("knee_strain_sd"));
+        let off: Vec<f64> =
+            (0..values.len()).map(|k| (chip.numbers("knee_strain")[k] - values[k]).abs() / deviations[k]).collect();
+        // The processes leave out rows that add less than a hundredth of the noise variance, a tenth of a deviation; filters alone know less.
+        assert!(off[..1200].iter().all(|off| *off < 0.1), "{:?}", off.iter().position(|off| *off >= 0.1));
+        assert!(off.iter().all(|off| *off < 1.5), "{off:?}");
+        // The flag of a missing reading.
+        let is_missing = |row: usize| chip.numbers("knee_flags")[row] as u32 & 1;
+        assert_eq!((is_missing(1210), is_missing(1300)), (1, 0));
+    }
+    for (flags, refused) in [
+        (["--estimator", "ekf"], "--estimator is for one sensor"),
+        (["--budget", "lean"], "--budget is for one sensor"),
+        (["--score", "knee.csv"], "--score is for one sensor"),
+        (["--prefix", "inner"], "column `inner_ohm`: its name in C is that of the hand"),
+    ] {
+        let run = bench.run(&[&export[..], &flags].concat());
+        assert!(run.stderr.contains(refused), "{}", run.stderr);
+    }
 }
 
 /// A channel that is unplugged or shorted from 110 s on leaves the others working.

@@ -10,6 +10,7 @@ mod correction;
 mod cost;
 mod firmware;
 mod fixed_rate;
+mod hand;
 mod law;
 mod literal;
 mod motion;
@@ -36,6 +37,7 @@ pub use budget::{Budget, Candidate, Room, candidates, first_fitting};
 use constants::Exported;
 pub use cost::{Cost, Processor, cost};
 pub use firmware::Firmware;
+pub use hand::{HandChannel, HandFirmware, HandJoint};
 use ohmstrain::MADE_BY;
 pub use pace::usual_step_s;
 pub use plan::{ChipFilter, Plan};
@@ -165,6 +167,19 @@ const C_PARTS: [Template; 3] = [
 const RUST: [Template; 2] =
     [("sensor.rs", include_str!("templates/sensor.rs")), ("README.md", include_str!("templates/readme_rust.md"))];
 
+/// Returns an environment whose variables stand between `<<` and `>>`: C contains many double braces.
+fn environment() -> Result<Environment<'static>, ExportError> {
+    let mut environment = Environment::new();
+    let syntax = SyntaxConfig::builder()
+        .variable_delimiters("<<", ">>")
+        .trim_blocks(true)
+        .lstrip_blocks(true)
+        .keep_trailing_newline(true)
+        .build()?;
+    environment.set_syntax(syntax);
+    Ok(environment)
+}
+
 /// Returns the files of a sensor with readings every `dt_s` seconds; the header repeats its promise.
 ///
 /// # Errors
@@ -182,15 +197,7 @@ pub fn files(
         ExportTarget::C => &C,
         ExportTarget::Rust => &RUST,
     };
-    let mut environment = Environment::new();
-    // C contains many double braces.
-    let syntax = SyntaxConfig::builder()
-        .variable_delimiters("<<", ">>")
-        .trim_blocks(true)
-        .lstrip_blocks(true)
-        .keep_trailing_newline(true)
-        .build()?;
-    environment.set_syntax(syntax);
+    let mut environment = environment()?;
     for (name, part) in C_PARTS {
         environment.add_template(name, part)?;
     }

@@ -40,8 +40,19 @@ pub fn replay(
     dt_s: f64,
     rows: &[ReplayedRow],
 ) -> Result<Vec<ChipEstimate>, ExportError> {
+    replay_from(params, plan, dt_s, None, rows)
+}
+
+/// Returns the same for a sensor whose reading at rest was measured.
+pub(crate) fn replay_from(
+    params: &SensorParams,
+    plan: &Plan,
+    dt_s: f64,
+    rest: Option<f64>,
+    rows: &[ReplayedRow],
+) -> Result<Vec<ChipEstimate>, ExportError> {
     let filter = ChipFilter::new(params, plan)?;
-    with_sizes!(params.law.branches.len(), B, N, L => of::<B, N, L>(params, &filter, dt_s, rows))
+    with_sizes!(params.law.branches.len(), B, N, L => of::<B, N, L>(params, &filter, dt_s, rest, rows))
         .unwrap_or_else(|| Err(too_many_branches()))
 }
 
@@ -49,15 +60,17 @@ fn of<const B: usize, const N: usize, const L: usize>(
     params: &SensorParams,
     filter: &ChipFilter,
     dt_s: f64,
+    rest: Option<f64>,
     rows: &[ReplayedRow],
 ) -> Result<Vec<ChipEstimate>, ExportError> {
     let sensor = FixedRate::<B, N>::new::<L>(params, filter, dt_s as f32)?;
-    let replay = Replay { rows, protections: Protections::ALL };
+    let replay = Replay { rows, rest, protections: Protections::ALL };
     with_twin::<_, B, N, L, _>(&sensor, sensor.model, sensor.interpolated(), replay)
 }
 
 struct Replay<'a> {
     rows: &'a [ReplayedRow],
+    rest: Option<f64>,
     protections: Protections,
 }
 
@@ -72,6 +85,9 @@ impl<T: Real> Task<T> for Replay<'_> {
         F: SensorEstimator<T, N, L, Prepared = F> + StepNumbers<T>,
     {
         let mut live = live.protected_by(self.protections);
+        if let Some(measured) = self.rest {
+            live.rest(T::of(f64::from(measured as f32)))?;
+        }
         let estimate = |row: &ReplayedRow| {
             let [reading, sd] = [row.reading, row.reading_sd].map(|number| T::of(f64::from(number as f32)));
             let reading = (!row.reading.is_nan()).then(|| live.relative(reading, sd));

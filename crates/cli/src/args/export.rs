@@ -26,7 +26,7 @@ impl From<Target> for ExportTarget {
 /// Flags of `export`.
 #[derive(Debug, ClapArgs)]
 pub struct ExportArgs {
-    /// The sensor's parameters
+    /// The sensor's parameters, or a hand.toml: all its joints, in C
     #[arg(long, value_name = "sensor.toml")]
     pub sensor: PathBuf,
     /// Language to export to

@@ -2,8 +2,8 @@ use std::path::Path;
 
 use ohmstrain::trace::{self, reading_column};
 use ohmstrain::{
-    Error, Estimate, Filter, FilterBuilder, FusedEstimate, FusedFilter, FusedSensor, Quantity, Reading, ReadingUnit,
-    Sensor, UnitGuess,
+    Error, Estimate, Filter, FilterBuilder, FusedEstimate, FusedFilter, FusedSensor, FusionParams, Quantity, Reading,
+    ReadingUnit, Sensor, UnitGuess,
 };
 use ohmstrain_bench_data::{LineParser, Metadata};
 
@@ -82,6 +82,11 @@ impl<'a> Joint<'a> {
     pub fn is_strain(&self) -> bool {
         let params = |channel: &'_ Channel| (channel.sensor.params().quantity, channel.sensor.params().joint.is_none());
         self.channels.iter().all(|channel| params(channel) == (Quantity::Strain, true))
+    }
+
+    /// Returns the parameters of its fusion; `None` for a joint with one channel.
+    pub fn fusion_params(&self) -> Option<&FusionParams> {
+        self.fusion.as_ref().map(FusedSensor::params)
     }
 
     /// Returns the quantity that its sensors were calibrated on.

@@ -3,6 +3,7 @@
 pub mod calibrate;
 pub mod description;
 pub mod evaluate;
+pub mod export;
 pub mod joint;
 pub mod lines;
 pub mod scores;

@@ -1,0 +1,69 @@
+//! All joints of a hand as source code.
+
+use std::path::Path;
+
+use ohmstrain::SensorParams;
+use ohmstrain_bench_data::FrontEndSpec;
+use ohmstrain_export::{ExportTarget, HandChannel, HandFirmware, HandJoint};
+
+use super::description::Description;
+use super::joint::Joint;
+use super::{joints, refuse_flags};
+use crate::args::ExportArgs;
+use crate::commands::export_choice::usual_step_s;
+use crate::error::CliError;
+use crate::output::{Kind, Outputs, print};
+
+/// Writes a filter for each channel, their fusion, and what calls them.
+pub fn run(args: &ExportArgs, hand: &Path) -> Result<(), CliError> {
+    refuse_flags([
+        ("--target rust", ExportTarget::from(args.target) == ExportTarget::Rust),
+        ("--estimator", args.estimator.chosen().is_some()),
+        ("--budget", args.budget.is_some()),
+        ("--score", args.score.is_some()),
+    ])?;
+    let description = Description::read(hand)?;
+    let joints = joints(&description, hand, "")?;
+    let refused = |error| CliError::export(&error, &hand.display().to_string());
+    let usual = |params: &SensorParams| usual_step_s(args.dt_s, params);
+    let steps: Vec<f64> = channels(&joints).map(usual).collect::<Result<_, _>>()?;
+    // The slowest channel has the longest step.
+    let dt_s = steps.into_iter().fold(0.0, f64::max);
+    let exported: Vec<HandJoint> = joints.iter().map(exported).collect();
+    let firmware = HandFirmware::new(&exported, dt_s, &args.prefix).map_err(refused)?;
+    let files = description.files(hand);
+    let mut outputs = Outputs::new(args.force, &files);
+    for file in firmware.files {
+        let path = args.output.join(&file.path);
+        if let Some(folder) = path.parent() {
+            outputs.folder(folder)?;
+        }
+        let output = outputs.claim(&path, Kind::Source)?;
+        outputs.put(output, file.content);
+    }
+    print(|out| firmware.costs.iter().try_for_each(|line| Ok(writeln!(out, "{line}")?)))?;
+    outputs.publish()
+}
+
+fn channels<'j>(joints: &'j [Joint]) -> impl Iterator<Item = &'j SensorParams> {
+    joints.iter().flat_map(|joint| &joint.channels).map(|channel| channel.sensor.params())
+}
+
+/// Returns a joint in the form that is exported.
+fn exported<'j>(joint: &'j Joint) -> HandJoint<'j> {
+    let channel = |one: &'j super::joint::Channel| HandChannel {
+        column: one.entry.column.clone(),
+        params: one.sensor.params(),
+        rest_resistance: one.rest_resistance,
+        series_ohm: match one.entry.front_end {
+            Some(FrontEndSpec::Divider { reference_ohm, .. }) => Some(reference_ohm),
+            _ => None,
+        },
+    };
+    HandJoint {
+        name: joint.name.into(),
+        channels: joint.channels.iter().map(channel).collect(),
+        fusion: joint.fusion_params(),
+        joint: joint.channels.iter().find_map(|channel| channel.sensor.params().joint),
+    }
+}
