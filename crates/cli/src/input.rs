@@ -3,10 +3,11 @@ use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use ohmstrain::trace::TraceFile;
-use ohmstrain_bench_data::{Metadata, ParquetText, TraceReader};
+use ohmstrain_bench_data::{Metadata, ParquetText, TraceError, TraceReader};
 use sha2::{Digest, Sha256};
 
 use crate::error::CliError;
+use crate::readings::late;
 use crate::sensor_file;
 use crate::whole_file::is_stdin;
 
@@ -59,7 +60,7 @@ pub fn read(path: &Path, overrides: &Metadata) -> Result<TraceFile, CliError> {
         let sha256 = sha256_of(path).map_err(unreadable)?;
         let (text, metadata) = text_of_parquet(path, overrides)?;
         let rows = TraceReader::with_overrides(text, &path.display().to_string(), &metadata)?;
-        return Ok(TraceFile::collect(rows, sha256)?);
+        return TraceFile::collect(rows, sha256).map_err(several);
     }
     of_text(&mut file, path, overrides)
 }
@@ -74,8 +75,16 @@ fn of_text<R: BufRead>(source: &mut R, path: &Path, overrides: &Metadata) -> Res
     let mut digest = Sha256::new();
     let hashed = Hashed { source, digest: &mut digest };
     let rows = TraceReader::with_overrides(hashed, &path.display().to_string(), overrides)?;
-    let file = TraceFile::collect(rows, String::new())?;
+    let file = TraceFile::collect(rows, String::new()).map_err(several)?;
     Ok(TraceFile { sha256: hexadecimal(&digest.finalize()), ..file })
+}
+
+/// Creates the error of a recording; where the clock begins anew, with advice on several recordings in one file.
+fn several(error: TraceError) -> CliError {
+    late(
+        error,
+        "`ohmstrain import --split-recordings` makes a file of each recording (with --each for several channels)",
+    )
 }
 
 /// A source whose bytes are hashed as they are read.

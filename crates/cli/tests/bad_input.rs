@@ -144,9 +144,12 @@ fn a_recording_that_is_none_is_refused_alike_by_every_command() {
         let anew = "; if the clock has started again there, --skip-bad goes on with another filter";
         let in_parts =
             "; if the clock has started again there, give each part a file of its own, or `filter --skip-bad` both";
+        let split = "; if the clock has started again there, `ohmstrain import --split-recordings` makes a file of each recording \
+                     (with --each for several channels)";
         let of = |command: &[&str]| match command[0] {
             "filter" if is_back => anew,
             "smooth" if is_back => in_parts,
+            _ if is_back => split,
             _ => hint,
         };
         for command in READERS {

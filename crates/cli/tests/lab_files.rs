@@ -244,6 +244,48 @@ fn joints_of_one_file_are_imported_and_calibrated_together() {
     assert!(code == Some(0), "{stderr}");
 }
 
+/// A clock that begins anew, or another value in a column `trial`, is another recording, of all channels too: a file for each, on all of
+/// which `calibrate` makes one hand.
+#[test]
+fn trials_of_several_joints_are_several_recordings() {
+    let bench = Bench::new();
+    let row = |k: u32| {
+        let (trial, time) = (1 + k / 300, 0.1 * f64::from(k % 300));
+        let bend = 20.0 - 20.0 * (0.6 * time + f64::from(trial)).cos();
+        // The sensor has a memory of two seconds.
+        let ohm = |scale: f64| scale * (1.0 + 0.02 * bend + 0.1 * (0.6 * time).sin() + 0.002 * f64::from(k % 7));
+        format!("{trial},{time:.1},{:.2},{:.2},{bend:.3},{:.3}\n", ohm(1000.0), ohm(1500.0), 0.5 * bend)
+    };
+    let rows: String = (0..600).map(row).collect();
+    bench.write("glove.csv", format!("trial,time_s,thumb_ohm,index_ohm,thumb_angle_deg,index_angle_deg\n{rows}"));
+    let command = bench.run(&["inspect", "glove.csv", "--suggest"]).ok();
+    assert_eq!(command, "ohmstrain import glove.csv --each --split-recordings -o trace.csv\n");
+    let (code, _, stderr) = shell(&bench, &command);
+    assert!(code == Some(0) && stderr.contains("trace-2.csv: recording 2, 300 rows, lines 302 to 601"), "{stderr}");
+    let second = Csv::new(&bench.read("trace-2.csv"));
+    assert_eq!(second.header, "time_s,thumb_ohm,index_ohm,thumb_angle_deg,index_angle_deg");
+    assert_eq!((second.len(), second.cells("time_s")[0]), (300, "0"));
+    let calibrate = ["calibrate", "trace-1.csv", "trace-2.csv", "-o", "hand.toml", "--estimator", "ekf", "--quiet"];
+    bench.run(&calibrate).ok();
+    // The whole file is no recording, and the answer is in the message.
+    let refused = bench.run(&["calibrate", "glove.csv", "-o", "hand.toml", "--force"]);
+    assert!(refused.code == Some(4) && refused.stderr.contains("glove.csv:302: column `time_s`"), "{}", refused.stderr);
+    assert!(refused.stderr.contains("ohmstrain import --split-recordings"), "{}", refused.stderr);
+    // Another value of the trial begins another recording on a clock that goes on, too.
+    let goes_on: String = (0..600)
+        .map(row)
+        .enumerate()
+        .map(|(k, line)| {
+            let cells: Vec<&str> = line.split(',').collect();
+            format!("{},{:.1},{}", cells[0], 0.1 * k as f64, cells[2..].join(","))
+        })
+        .collect();
+    bench.write("long.csv", format!("trial,time_s,thumb_ohm,index_ohm,thumb_angle_deg,index_angle_deg\n{goes_on}"));
+    let run = bench.run(&["import", "long.csv", "--each", "--split-recordings", "-o", "long_trace.csv"]);
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    assert_eq!(Csv::new(&bench.read("long_trace-2.csv")).len(), 300);
+}
+
 #[test]
 fn a_table_of_many_columns_is_cut() {
     let bench = Bench::new();

@@ -28,7 +28,7 @@ mod _core {
     #[pymodule_export]
     use super::error::OhmstrainError;
     #[pymodule_export]
-    use super::fused::{FusedFilter, FusedSensor};
+    use super::fused::{FusedFilter, FusedSensor, read_hand};
     #[pymodule_export]
     use super::live::{LaggedFilter, LiveFilter};
     #[pymodule_export]

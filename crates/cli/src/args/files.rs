@@ -38,7 +38,7 @@ pub struct ImportArgs {
     pub split_recordings: bool,
     /// Write every channel, with its reference, as columns of one recording: thumb_ohm, index_ohm, thumb_angle_deg, …, which
     /// `calibrate -o hand.toml` takes. --column resistance=… for each, if not all that look like readings are meant
-    #[arg(long, conflicts_with = "split_recordings")]
+    #[arg(long)]
     pub each: bool,
     /// A channel and its reference, where their names do not tell: 'R1=theta1'
     #[arg(long = "pair", value_name = "COLUMN=COLUMN", value_parser = pair, requires = "each")]

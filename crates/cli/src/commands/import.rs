@@ -17,12 +17,20 @@ pub fn run(args: &ImportArgs, messages: &Messages) -> Result<(), CliError> {
     let recipe = args.known.recipe();
     if let Some(path) = args.output.as_deref().filter(|_| args.split_recordings) {
         let tables = lab_files::read(&args.files, &recipe)?;
-        return split(outputs, path, &tables, &Plan::new(&tables, &recipe)?, messages);
+        if args.each {
+            let plan = EachPlan::new(&tables, &recipe, &args.pairs)?;
+            name_channels(&plan, &tables, messages);
+            return split(outputs, path, &plan.recordings(&tables)?, messages, |part| each(&plan, part, messages));
+        }
+        let plan = Plan::new(&tables, &recipe)?;
+        messages.remark(&columns(&plan, &tables));
+        return split(outputs, path, &plan.recordings(&tables)?, messages, |part| trace(&plan, part, messages));
     }
     let output = outputs.claim_or_stdout(args.output.as_deref(), Kind::Import)?;
     let tables = lab_files::read(&args.files, &recipe)?;
     if args.each {
         let plan = EachPlan::new(&tables, &recipe, &args.pairs)?;
+        name_channels(&plan, &tables, messages);
         return outputs.publish_or_print(output, each(&plan, &tables, messages)?);
     }
     let plan = Plan::new(&tables, &recipe)?;
@@ -35,23 +43,21 @@ pub fn run(args: &ImportArgs, messages: &Messages) -> Result<(), CliError> {
 fn split(
     mut outputs: Outputs,
     path: &Path,
-    tables: &[Table],
-    plan: &Plan,
+    recordings: &[Vec<Table>],
     messages: &Messages,
+    text: impl Fn(&[Table]) -> Result<Vec<u8>, CliError>,
 ) -> Result<(), CliError> {
     if path == Path::new("-") {
         return Err(CliError::Arguments("--split-recordings: expected -o with the name of a file, found -".into()));
     }
-    let recordings = plan.recordings(tables)?;
-    messages.remark(&columns(plan, tables));
-    for (number, recording) in (1..).zip(&recordings) {
+    for (number, recording) in (1..).zip(recordings) {
         let path = numbered(path, number);
         let claim = outputs.claim(&path, Kind::Import)?;
         let lines = &recording[0].lines;
         let (first, last) = (lines.first().unwrap_or(&0), lines.last().unwrap_or(&0));
         let rows = counted(recording[0].len(), "row");
         messages.remark(&format!("{}: recording {number}, {rows}, lines {first} to {last}", path.display()));
-        outputs.put(claim, trace(plan, recording, messages)?);
+        outputs.put(claim, text(recording)?);
     }
     outputs.publish()
 }
@@ -75,12 +81,16 @@ fn trace(plan: &Plan, tables: &[Table], messages: &Messages) -> Result<Vec<u8>, 
     Ok(bytes)
 }
 
-/// Returns the text of a recording of all channels.
-fn each(plan: &EachPlan, tables: &[Table], messages: &Messages) -> Result<Vec<u8>, CliError> {
+/// Lists the channels with their references.
+fn name_channels(plan: &EachPlan, tables: &[Table], messages: &Messages) {
     for (name, reading, reference) in plan.columns(tables) {
         let reference = reference.map_or("no reference".into(), |reference| format!("its reference {reference}"));
         messages.remark(&format!("{name} = {reading}, {reference}"));
     }
+}
+
+/// Returns the text of a recording of all channels.
+fn each(plan: &EachPlan, tables: &[Table], messages: &Messages) -> Result<Vec<u8>, CliError> {
     let mut trace = plan.import(tables)?;
     trace.metadata.other.push(("made_by".into(), format!("{MADE_BY} {IMPORT}")));
     trace.remarks.iter().for_each(|remark| messages.remark(remark));

@@ -1,5 +1,6 @@
 //! Recordings as traces: the rows of a trace CSV, with the name, the header and the hash of its file.
 
+mod hand;
 mod marks;
 
 use std::borrow::Cow;
@@ -16,6 +17,7 @@ use thiserror::Error;
 
 use crate::number::significant;
 use crate::{CalibrationDoubt, Error, Interface, Reading, Recording, Sensor};
+pub use hand::{HAND_FORMAT, HandChannel, HandDescription, HandError, HandJoint};
 pub use marks::{Marked, take_marks};
 
 /// Number of excluded rows that are named one by one.

@@ -16,6 +16,7 @@ from . import plot
 from ._core import MADE_BY, OhmstrainError
 from ._evaluation import Evaluation, Scores, evaluate
 from ._fused import FusedFilter, FusedSensor
+from ._hand import Hand, HandFilter
 from ._read import read
 from ._sensor import LaggedFilter, LiveFilter, OhmstrainWarning, Prior, Sensor, calibrate
 
@@ -25,6 +26,8 @@ __all__ = [
     "Evaluation",
     "FusedFilter",
     "FusedSensor",
+    "Hand",
+    "HandFilter",
     "LaggedFilter",
     "LiveFilter",
     "OhmstrainError",

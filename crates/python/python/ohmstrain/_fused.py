@@ -52,6 +52,6 @@ class FusedFilter:
 
         The result contains ``strain`` (in degrees if the sensors were calibrated on an angle) with ``strain_sd``; ``angle_deg`` and
         ``angle_sd`` for sensors on a joint; ``faulty``, the index of a channel that disagrees with all others and was left out; and
-        ``is_unlike``, true if the readings together are unlike any in the calibration. An error leaves the filter as it was.
+        ``is_unlike``, true if the readings together are unlike any in the calibration; and ``flags``, those of each channel. An error leaves the filter as it was.
         """
         return self._core.step(time_s, list(readings))

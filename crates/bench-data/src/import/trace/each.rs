@@ -98,6 +98,14 @@ impl EachPlan {
         self.channels.iter().map(of).collect()
     }
 
+    /// Splits a file into its recordings, as [`Plan::recordings`] does.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn recordings(&self, tables: &[Table]) -> Result<Vec<Vec<Table>>, ImportError> {
+        self.channels.first().map_or_else(|| Ok(vec![tables.to_vec()]), |first| first.plan.recordings(tables))
+    }
+
     /// Makes the recording, with remarks on the conversion.
     ///
     /// # Errors

@@ -9,7 +9,7 @@ use ohmstrain_sensor::EstimatorKind;
 use super::journal::{JOURNAL, Journal};
 use super::summary::SUMMARY;
 use crate::args::{Args, BatchArgs, BatchCommand, Command, Estimators, Format};
-use crate::commands::hand::description::Description;
+use crate::commands::hand::description;
 use crate::commands::hand::joints;
 use crate::error::CliError;
 use crate::renamed;
@@ -270,7 +270,7 @@ pub fn check_sensor(jobs: &[Job], args: &BatchArgs) -> Result<(), CliError> {
         if args.command == BatchCommand::Hand
             || (args.command != BatchCommand::Filter && sensor_file::is_of_a_hand(sensor))
         {
-            joints(&Description::read(sensor)?, sensor, "").map(drop)
+            joints(&description::read(sensor)?, sensor, "").map(drop)
         } else {
             sensor_file::read(sensor, estimator).map(drop)
         }

@@ -12,7 +12,7 @@ use super::plan::Job;
 use super::scores::Figures;
 use crate::args::{BatchArgs, Command};
 use crate::commands::evaluate::{self, Evaluation};
-use crate::commands::hand::{self, description::Description};
+use crate::commands::hand::{self, description};
 use crate::commands::{calibrate, filter, smooth};
 use crate::error::CliError;
 use crate::input::{sha256_of, sha256_of_all};
@@ -79,7 +79,7 @@ impl<'a> Workshop<'a> {
         if let Some(hash) = known.get(path) {
             return Ok(hash.clone());
         }
-        let hand = sensor_file::is_of_a_hand(path).then(|| Description::read(path).ok()).flatten();
+        let hand = sensor_file::is_of_a_hand(path).then(|| description::read(path).ok()).flatten();
         let hash = match hand {
             Some(hand) => sha256_of_all(&hand.files(path))?,
             None => sha256_of(path)?,

@@ -3,12 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use ohmstrain::trace::{TraceFile, check_alike, known_recordings};
+use ohmstrain::trace::{HAND_FORMAT, HandChannel, TraceFile, check_alike, known_recordings};
 use ohmstrain::{Calibrated, Fused, MADE_BY, Recording, fuse};
 use ohmstrain_calib::Samples;
 use serde::Serialize;
 
-use super::description::{Channel as Entry, FORMAT};
 use super::scores::{self, ChannelScores, JointScores};
 use crate::args::CalibrateArgs;
 use crate::channels::{Channel, Table, reference};
@@ -33,11 +32,11 @@ struct Written {
 struct WrittenJoint {
     name: String,
     #[serde(flatten)]
-    only: Option<Entry>,
+    only: Option<HandChannel>,
     #[serde(skip_serializing_if = "Option::is_none")]
     fusion: Option<PathBuf>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    channels: Vec<Entry>,
+    channels: Vec<HandChannel>,
 }
 
 /// Channels of one joint.
@@ -63,7 +62,7 @@ pub fn run(args: &CalibrateArgs, tables: &[Table], messages: &Messages) -> Resul
         written.push(joint);
         scored.push(scores);
     }
-    let text = toml::to_string(&Written { format: FORMAT, made_by: MADE_BY, joints: written });
+    let text = toml::to_string(&Written { format: HAND_FORMAT, made_by: MADE_BY, joints: written });
     outputs.put(hand, text.map_err(|error| CliError::Other(format!("cannot write the description: {error}")))?);
     outputs.publish()?;
     if messages.is_quiet() && !args.json {
@@ -176,7 +175,7 @@ impl Group {
             let column = self.channels[k].column.clone();
             let first = recordings[k].first().filter(|first| first.trace.readings.converter.is_some());
             let front_end = first.and_then(|first| first.trace.metadata.front_end);
-            entries.push(Entry { column, sensor: path, rest_resistance: None, front_end });
+            entries.push(HandChannel { column, sensor: path, rest_resistance: None, front_end });
         }
         let name = self.name.clone();
         let Some((path, claim)) = files.fusion else {

@@ -7,7 +7,7 @@ use ohmstrain::trace::TraceFile;
 use ohmstrain::{Reading, ScoredRow, score};
 use ohmstrain_bench_data::Metadata;
 
-use super::description::Description;
+use super::description;
 use super::joint::{Channel, Joint, JointRow};
 use super::scores::{ChannelScores, JointScores};
 use super::{joints, refuse_flags};
@@ -30,7 +30,7 @@ pub fn run(
         ("--known-every", args.known_every.is_some()),
         ("--check", args.check),
     ])?;
-    let description = Description::read(hand)?;
+    let description = description::read(hand)?;
     for path in &args.traces {
         let Some(table) = Table::read(path)? else {
             let what = "expected a recording with two or more columns of readings, NAME_ohm or NAME_ratio, as hand.toml names them";

@@ -6,7 +6,7 @@ use ohmstrain::SensorParams;
 use ohmstrain_bench_data::FrontEndSpec;
 use ohmstrain_export::{ExportTarget, HandChannel, HandFirmware, HandJoint};
 
-use super::description::Description;
+use super::description;
 use super::joint::Joint;
 use super::{joints, refuse_flags};
 use crate::args::ExportArgs;
@@ -22,7 +22,7 @@ pub fn run(args: &ExportArgs, hand: &Path) -> Result<(), CliError> {
         ("--budget", args.budget.is_some()),
         ("--score", args.score.is_some()),
     ])?;
-    let description = Description::read(hand)?;
+    let description = description::read(hand)?;
     let joints = joints(&description, hand, "")?;
     let refused = |error| CliError::export(&error, &hand.display().to_string());
     let usual = |params: &SensorParams| usual_step_s(args.dt_s, params);

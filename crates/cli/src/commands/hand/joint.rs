@@ -1,13 +1,12 @@
 use std::path::Path;
 
-use ohmstrain::trace::{self, reading_column};
+use ohmstrain::trace::{self, HandChannel, HandJoint, reading_column};
 use ohmstrain::{
     Error, Estimate, Filter, FilterBuilder, FusedEstimate, FusedFilter, FusedSensor, FusionParams, Quantity, Reading,
     ReadingUnit, Sensor, UnitGuess,
 };
 use ohmstrain_bench_data::{LineParser, Metadata};
 
-use super::description::{Channel as Entry, Joint as Description};
 use crate::error::CliError;
 use crate::sensor_file;
 use crate::suits::FIRST_LIVE_READINGS;
@@ -31,7 +30,7 @@ enum JointFilter {
 pub struct Channel<'a> {
     /// Name of its joint.
     pub joint: &'a str,
-    pub entry: &'a Entry,
+    pub entry: &'a HandChannel,
     pub sensor: Sensor,
     /// Reading of the rested sensor, if it differs from that in calibration.
     pub rest_resistance: Option<f64>,
@@ -58,8 +57,8 @@ pub struct JointRow {
 
 impl<'a> Joint<'a> {
     /// Reads the sensors of a joint from the folder of the description, for a recording with this name.
-    pub fn new(joint: &'a Description, folder: &Path, file: &str) -> Result<Self, CliError> {
-        let channel = |entry: &'a Entry| Channel::new(joint, entry, folder, file);
+    pub fn new(joint: &'a HandJoint, folder: &Path, file: &str) -> Result<Self, CliError> {
+        let channel = |entry: &'a HandChannel| Channel::new(joint, entry, folder, file);
         let channels: Vec<Channel<'a>> = joint.channels.iter().map(channel).collect::<Result<_, _>>()?;
         let sensors = || channels.iter().map(|channel| channel.sensor.clone()).collect();
         let fusion = joint.fusion.as_ref().map(|path| {
@@ -195,7 +194,7 @@ fn angle(estimate: &Estimate) -> (f64, f64) {
 }
 
 impl<'a> Channel<'a> {
-    fn new(joint: &'a Description, entry: &'a Entry, folder: &Path, file: &str) -> Result<Self, CliError> {
+    fn new(joint: &'a HandJoint, entry: &'a HandChannel, folder: &Path, file: &str) -> Result<Self, CliError> {
         // Readings of a hand are not converted to one temperature.
         let mut sensor = sensor_file::read(&folder.join(&entry.sensor), None)?.without_temperature();
         if let Some(spec) = joint.joint {

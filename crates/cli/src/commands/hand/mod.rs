@@ -12,7 +12,7 @@ pub mod smooth;
 use std::io::Write;
 use std::path::Path;
 
-use ohmstrain::trace;
+use ohmstrain::trace::{self, HandDescription};
 use ohmstrain::{Error, Reading};
 use ohmstrain_bench_data::{Row, RowWriter, counted};
 
@@ -20,13 +20,12 @@ use crate::args::{EstimateArgs, HandArgs};
 use crate::error::CliError;
 use crate::messages::Messages;
 use crate::output::RowsOut;
-use description::Description;
 use joint::{Joint, JointRow};
 use lines::{HandLines, channels};
 
 /// Turns readings of all joints into angles, row by row as they arrive; returns the number of rows.
 pub fn run(args: &HandArgs, messages: &Messages) -> Result<u64, CliError> {
-    let description = Description::read(&args.hand)?;
+    let description = description::read(&args.hand)?;
     let mut lines = HandLines::open(&args.trace_file, args.skip_bad)?;
     let mut joints = joints(&description, &args.hand, &lines.file)?;
     let inputs = std::iter::once(args.trace_file.clone()).chain(description.files(&args.hand));
@@ -42,7 +41,7 @@ pub fn run(args: &HandArgs, messages: &Messages) -> Result<u64, CliError> {
 }
 
 /// Reads the sensors of all joints for a recording with this name.
-pub fn joints<'d>(description: &'d Description, hand: &Path, file: &str) -> Result<Vec<Joint<'d>>, CliError> {
+pub fn joints<'d>(description: &'d HandDescription, hand: &Path, file: &str) -> Result<Vec<Joint<'d>>, CliError> {
     let folder = hand.parent().unwrap_or(Path::new(""));
     description.joints.iter().map(|joint| Joint::new(joint, folder, file)).collect()
 }

@@ -3,7 +3,7 @@
 use ohmstrain::{Reading, trace};
 use ohmstrain_bench_data::RowWriter;
 
-use super::description::Description;
+use super::description;
 use super::joint::JointRow;
 use super::lines::{HandLines, channels};
 use super::{columns, doubt, header, joints, refuse_estimate, refuse_flags, write};
@@ -18,7 +18,7 @@ pub fn run(args: &SmoothArgs, messages: &Messages) -> Result<u64, CliError> {
     refuse_estimate(&args.estimate)?;
     let parquet = written.format() == Format::Parquet;
     refuse_flags([("--columns", !written.columns.is_empty()), ("--format parquet", parquet)])?;
-    let description = Description::read(hand)?;
+    let description = description::read(hand)?;
     let mut lines = HandLines::open(&args.trace_file, false)?;
     let mut joints = joints(&description, hand, &lines.file)?;
     let inputs = std::iter::once(args.trace_file.clone()).chain(description.files(hand));

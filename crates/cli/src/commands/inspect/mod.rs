@@ -82,10 +82,12 @@ fn each(files: &[PathBuf], tables: &[Table], recipe: &Recipe) -> Option<Each> {
         return None;
     }
     let plan = EachPlan::new(tables, recipe, &[]).ok()?;
-    plan.import(tables).ok()?;
-    let command = lab_files::command_of(files, recipe, &["--each"]);
+    let recordings = plan.recordings(tables).ok()?;
+    recordings.iter().try_for_each(|recording| plan.import(recording).map(drop)).ok()?;
+    let flags: &[&str] = if recordings.len() > 1 { &["--each", "--split-recordings"] } else { &["--each"] };
+    let command = lab_files::command_of(files, recipe, flags);
     let is_one = |file: &&PathBuf| channels::Table::read(file).is_ok_and(|table| table.is_some());
-    let next = files.first().filter(|file| files.len() == 1 && is_one(file));
+    let next = files.first().filter(|file| files.len() == 1 && recordings.len() == 1 && is_one(file));
     let next = next.map(|file| format!("ohmstrain calibrate {} -o hand.toml", shell_word(&file.display().to_string())));
     Some(Each { command, channels: plan.columns(tables), are_joints: plan.are_joints(), next })
 }

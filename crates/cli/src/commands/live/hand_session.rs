@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 use std::io;
 use std::time::Instant;
 
+use ohmstrain::trace::HandDescription;
 use ohmstrain_bench_data::{Metadata, Row};
 use ratatui::Frame;
 
@@ -12,7 +13,6 @@ use super::recorder::{self, Recorder};
 use super::session::{LEAST_AT_REST, MOST_POINTS, REST_S, recorded};
 use super::{Shown, hand_view};
 use crate::args::LiveArgs;
-use crate::commands::hand::description::Description;
 use crate::commands::hand::joint::{Joint, JointRow};
 use crate::commands::hand::lines::{HandParser, channels};
 use crate::commands::hand::{joints, refuse_estimate, refuse_flags, step};
@@ -52,7 +52,7 @@ impl<'a> HandSession<'a> {
     ///
     /// # Errors
     /// If a file cannot be read, the header lacks a column, or a flag is for one sensor.
-    pub fn new(args: &'a LiveArgs, description: &'a Description) -> Result<Self, CliError> {
+    pub fn new(args: &'a LiveArgs, description: &'a HandDescription) -> Result<Self, CliError> {
         refuse_estimate(&args.estimate)?;
         refuse_flags([
             ("--gauge-length-mm", args.setup.gauge_length_mm.is_some()),

@@ -18,7 +18,7 @@ use ratatui::crossterm::event::{self, Event as Input, KeyCode, KeyEventKind, Key
 use ratatui::{DefaultTerminal, Frame};
 
 use crate::args::LiveArgs;
-use crate::commands::hand::description::Description;
+use crate::commands::hand::description;
 use crate::error::CliError;
 use crate::messages::Messages;
 use crate::output::refuse_stdout;
@@ -64,7 +64,7 @@ pub fn run(args: &LiveArgs, messages: &Messages) -> Result<(), CliError> {
     }
     refuse_stdout(&args.record)?;
     if sensor_file::is_of_a_hand(&args.estimate.sensor) {
-        let description = Description::read(&args.estimate.sensor)?;
+        let description = description::read(&args.estimate.sensor)?;
         return watch(&mut HandSession::new(args, &description)?, args, messages);
     }
     let kind = args.estimate.estimator.chosen().map(|estimator| estimator.0);
