@@ -6,7 +6,7 @@ use crate::error::CliError;
 use crate::whole_file;
 
 /// Message for a file that describes a hand where a sensor is expected.
-pub const A_HAND: &str = "is the description of a hand, not of a sensor: give it to `ohmstrain hand`, or to `smooth`, `live`, `evaluate` or `export`";
+pub const A_HAND: &str = "is the description of a hand, not of a sensor: give it to `ohmstrain hand`, or to `smooth`, `live`, `evaluate`, `export` or `batch`";
 
 /// Reads a sensor and checks that the estimator, or the file's default one, can be built from it.
 pub fn read(path: &Path, estimator: Option<EstimatorKind>) -> Result<Sensor, CliError> {
@@ -34,7 +34,7 @@ pub fn is_one(bytes: &[u8]) -> bool {
 
 /// True if this is the description of a hand.
 pub fn is_hand(text: &str) -> bool {
-    is_one(text.as_bytes()) && text.lines().any(|line| line.trim() == "[[joints]]")
+    text.lines().any(|line| line.split('#').next().unwrap_or_default().trim() == "[[joints]]")
 }
 
 /// True if a file is the description of a hand.

@@ -82,6 +82,16 @@ fn a_hand_is_smoothed_and_scored_joint_by_joint() {
         let run = bench.run(&[&["smooth", "pair.csv", "--sensor", "pair.toml"][..], &flags].concat());
         assert!(run.code == Some(2) && run.stderr.contains(refused), "{}", run.stderr);
     }
+    // A description by hand may have comments.
+    bench.write("noted.toml", bench.read("pair.toml").replace("[[joints]]", "[[joints]]  # of the left hand"));
+    let noted = Csv::new(&bench.run(&["smooth", "pair.csv", "--sensor", "noted.toml"]).ok());
+    assert_eq!(noted.cells("a_strain"), both.cells("a_strain"));
+    // A stream that was joined within a line.
+    let late = format!("00,16,17\n{}", bench.read("pair.csv"));
+    let angles = bench.feed(&["hand", "pair.toml", "--skip-bad"], late.clone());
+    assert!(angles.warnings.concat().contains("1 line was skipped"), "{}", angles.stderr);
+    let strict = bench.feed(&["hand", "pair.toml"], late);
+    assert!(strict.code == Some(4) && strict.stderr.contains("stdin:1: expected a header"), "{}", strict.stderr);
     bench.write("short.csv", "time_s,a_ohm,b_ohm\n0,1600,1600\n1,x,1600\n");
     let run = bench.run(&["smooth", "short.csv", "--sensor", "pair.toml", "-o", "none.csv"]);
     assert!(run.code == Some(4) && run.stderr.contains("short.csv:3:"), "{}", run.stderr);
@@ -113,6 +123,12 @@ fn hands_in_batches() {
     bench.write("sensor.toml", bench.read("sensor.toml") + "\n");
     let again = bench.run(&["batch", "hand", "--sensor", "pair.toml", "-o", "hand", "pair.csv"]);
     assert!(again.stderr.contains("1 done, 0 done before"), "{}", again.stderr);
+    let refused = bench.run(&["batch", "hand", "pair.toml", "pair.csv", "-o", "odd"]);
+    assert!(
+        refused.code == Some(2) && refused.stderr.contains("expected the hand.toml as --sensor"),
+        "{}",
+        refused.stderr
+    );
     let refused = bench.run(&["batch", "filter", "--sensor", "pair.toml", "-o", "filtered", "pair.csv"]);
     assert!(refused.code == Some(4) && refused.stderr.contains("ohmstrain hand"), "{}", refused.stderr);
 }

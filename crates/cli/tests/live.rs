@@ -217,10 +217,15 @@ fn a_hand_is_shown_recorded_and_zeroed() {
     terminal.wait_for("1 missing");
     terminal.press("r");
     terminal.wait_for("recorded live-1.csv (1 row)");
+    // A joint whose channel is not read stays as it was.
+    terminal.press("z");
+    terminal.wait_for("right stays as it was: right_ohm: no reading");
+    port.send(&format!("{},1600,1600\n", times[rows + 1]));
+    terminal.wait_for("52 at 5.0/s");
     terminal.press("z");
     terminal.wait_for("R0 of each channel");
     let left = terminal.quit();
-    assert!(left.contains("51 rows, 1 reading missing, 0 gaps, 2 lines skipped"), "{left}");
+    assert!(left.contains("52 rows, 1 reading missing, 0 gaps, 2 lines skipped"), "{left}");
     let recorded = Csv::new(&bench.read("live-1.csv"));
     assert_eq!(recorded.header, "time_s,left_ohm,right_ohm,mark");
     assert_eq!(

@@ -171,7 +171,7 @@ fn errors_name_the_kind_of_file_and_the_missing_part() {
     let estimates = bench.run(&["filter", "trace.csv", "--sensor", "sensor.toml"]).stdout;
     bench.write("estimates.csv", estimates);
     bench.write("hand.toml", "format = 1\n[[joints]]\nname = \"a\"\n");
-    let hand = "hand.toml is the description of a hand, not of a sensor: give it to `ohmstrain hand`, or to `smooth`, `live`, `evaluate` or `export`";
+    let hand = "hand.toml is the description of a hand, not of a sensor: give it to `ohmstrain hand`, or to `smooth`, `live`, `evaluate`, `export` or `batch`";
     for arguments in [
         &["inspect", "hand.toml"][..],
         &["filter", "trace.csv", "--sensor", "hand.toml"],

@@ -37,7 +37,7 @@ pub use budget::{Budget, Candidate, Room, candidates, first_fitting};
 use constants::Exported;
 pub use cost::{Cost, Processor, cost};
 pub use firmware::Firmware;
-pub use hand::{HandChannel, HandFirmware, HandJoint};
+pub use hand::{Divider, HandChannel, HandFirmware, HandJoint};
 use ohmstrain::MADE_BY;
 pub use pace::usual_step_s;
 pub use plan::{ChipFilter, Plan};

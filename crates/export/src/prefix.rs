@@ -5,7 +5,7 @@ use std::str::FromStr;
 pub struct Prefix(String);
 
 /// Prefix used in the templates.
-const WRITTEN: &str = "ohmstrain";
+pub const WRITTEN: &str = "ohmstrain";
 
 impl Default for Prefix {
     fn default() -> Self {
@@ -28,6 +28,11 @@ impl FromStr for Prefix {
 }
 
 impl Prefix {
+    /// Returns the prefix of a part: `left` and `index` give `left_index`.
+    pub fn of_part(&self, name: &str) -> Self {
+        Self(format!("{}_{name}", self.0))
+    }
+
     /// Replaces the prefix of the templates in a text or a file's name by this one.
     pub fn put_into(&self, text: &str) -> String {
         let Self(prefix) = self;

@@ -73,6 +73,8 @@ def test_electronics_and_errors(hand):
     codes["thumb_adc"] = np.round((2**24 - 1) * table["thumb_ohm"] / (table["thumb_ohm"] + 2000.0))
     found, expected = oh.Hand.load(hand / "codes.toml").filter(codes), oh.Hand.load(hand / "hand.toml").filter(table)
     np.testing.assert_allclose(found["thumb_strain"], expected["thumb_strain"], atol=1e-5)
+    with pytest.raises(oh.OhmstrainError, match="joint `thumb`: `front_end` in hand.toml"):
+        oh.Hand.load(hand / "codes.toml").filter()
     with pytest.raises(oh.OhmstrainError, match="expected a column `thumb_ohm`"):
         oh.Hand.load(hand / "hand.toml").filter(codes)
     (hand / "odd.toml").write_text(text.replace("format = 1", "format = 7"))

@@ -9,11 +9,14 @@ use super::process::Process;
 use super::twin::{HandVectors, Twin};
 use super::{HandChannel, HandJoint};
 use crate::literal::{Literal, literals};
+use crate::prefix::WRITTEN;
 use crate::{ExportError, Plan, cost};
 use ohmstrain::MADE_BY;
 
 /// Resistor of a divider that nothing is known of, Ω, as in the sketch of one sensor.
 const SERIES_OHM: f32 = 10_000.0;
+/// Largest code of its converter.
+const FULL: f32 = 1023.0;
 /// Bytes of code around the channels' filters on a Cortex-M4F, and bytes of a joint's state.
 const CODE: usize = 3800;
 const JOINT_STATE: usize = 16;
@@ -47,7 +50,10 @@ pub struct HandConstants {
 
 #[derive(Clone, Debug, Serialize)]
 struct ChannelConstants {
-    /// Prefix in C, and in capitals.
+    /// Name in C, and in capitals.
+    stem: String,
+    label: String,
+    /// Prefix of its functions, and in capitals, as long as the templates' prefix stands.
     name: String,
     upper: String,
     column: String,
@@ -55,6 +61,10 @@ struct ChannelConstants {
     is_ratio: bool,
     rest: Option<Literal>,
     series_ohm: Literal,
+    /// True if the sensor lies between the supply and the pin.
+    is_high: bool,
+    /// Largest code of the converter.
+    full: Literal,
 }
 
 #[derive(Debug, Serialize)]
@@ -65,8 +75,9 @@ struct JointConstants {
     /// Columns of value and standard deviation, as `hand` names them.
     column: String,
     sd_column: String,
-    /// Name of the first channel.
+    /// Prefix and name of the first channel.
     first: String,
+    first_stem: String,
     channels: Vec<ChannelConstants>,
     fused: bool,
     /// The value is `at_zero` + `per_strain` · strain.
@@ -141,20 +152,22 @@ impl HandConstants {
             unlike: Literal(UNLIKE as f32),
             vectors: twin.vectors(joints, plan, dt_s)?,
         };
-        let mut names: Vec<&str> = constants.channel_names().collect();
-        names.sort_unstable();
-        match names.windows(2).find(|pair| pair[0] == pair[1]) {
-            Some(pair) => Err(ExportError::Parameter(format!(
-                "expected channels with a name each, found two of the name `{}` in C",
-                pair[0]
+        let double = |mut names: Vec<String>| {
+            names.sort_unstable();
+            names.windows(2).find(|pair| pair[0] == pair[1]).map(|pair| pair[0].clone())
+        };
+        let of_joints = double(constants.joints.iter().map(|joint| joint.name.clone()).collect());
+        match of_joints.or_else(|| double(constants.channels.iter().map(|channel| channel.stem.clone()).collect())) {
+            Some(name) => Err(ExportError::Parameter(format!(
+                "expected joints and channels with a name each in C, found two of the name `{name}`"
             ))),
             None => Ok(constants),
         }
     }
 
-    /// Returns the prefixes of the channels in C.
+    /// Returns the names of the channels in C.
     pub(super) fn channel_names(&self) -> impl Iterator<Item = &str> {
-        self.channels.iter().map(|channel| channel.name.as_str())
+        self.channels.iter().map(|channel| channel.stem.as_str())
     }
 }
 
@@ -167,17 +180,21 @@ fn name_in_c(name: &str) -> String {
 
 fn channel(joint: &HandJoint, channel: &HandChannel) -> ChannelConstants {
     // The only channel of a joint has its name.
-    let stem = channel.column.rsplit_once('_').map_or(channel.column.as_str(), |(stem, _)| stem);
-    let name = name_in_c(if joint.channels.len() == 1 { &joint.name } else { stem });
+    let unit = ["_ohm", "_ratio", "_adc"].into_iter().find_map(|unit| channel.column.strip_suffix(unit));
+    let stem = name_in_c(if joint.channels.len() == 1 { &joint.name } else { unit.unwrap_or(&channel.column) });
     let is_ratio = channel.params.reading == ReadingUnit::Ratio;
     ChannelConstants {
-        upper: name.to_uppercase(),
-        name,
+        name: format!("{WRITTEN}_{stem}"),
+        upper: format!("{WRITTEN}_{stem}").to_uppercase(),
+        label: stem.to_uppercase(),
+        stem,
         column: channel.column.clone(),
         unit: if is_ratio { "ratio" } else { "ohm" },
         is_ratio,
         rest: channel.rest_resistance.map(|measured| Literal(measured as f32)),
-        series_ohm: Literal(channel.series_ohm.map_or(SERIES_OHM, |ohm| ohm as f32)),
+        series_ohm: Literal(channel.divider.map_or(SERIES_OHM, |divider| divider.reference_ohm as f32)),
+        is_high: channel.divider.is_some_and(|divider| divider.is_high),
+        full: Literal(channel.divider.map_or(FULL, |divider| divider.full as f32)),
     }
 }
 
@@ -191,6 +208,7 @@ fn joint_constants(joint: &HandJoint, (at_zero, per_strain): (f32, f32)) -> Join
         column: format!("{}_{ending}", joint.name),
         sd_column: format!("{}_{sd_ending}", joint.name),
         first: channels.first().map(|first| first.name.clone()).unwrap_or_default(),
+        first_stem: channels.first().map(|first| first.stem.clone()).unwrap_or_default(),
         channels,
         fused: joint.fusion.is_some(),
         at_zero: Literal(at_zero),

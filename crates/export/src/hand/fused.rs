@@ -69,7 +69,7 @@ impl ChipFusion<f64> {
     pub fn new(params: &FusionParams) -> Result<Self, ExportError> {
         let missing = || ExportError::Unsupported {
             what: "a fusion without the errors of its filters alone".into(),
-            instead: "calibrate again",
+            instead: "calibrate again, on recordings long enough that each quarter is estimated by the others",
         };
         let singular = || ExportError::Parameter("the rows of the fusion are too much alike".into());
         let filters = params.filters.as_ref().ok_or_else(missing)?;

@@ -34,8 +34,19 @@ pub struct HandChannel<'a> {
     pub params: &'a SensorParams,
     /// Today's reading of the rested sensor.
     pub rest_resistance: Option<f64>,
-    /// The other resistor of its divider, Ω, for the sketch.
-    pub series_ohm: Option<f64>,
+    /// Its divider, for the sketch.
+    pub divider: Option<Divider>,
+}
+
+/// A divider of a sensor and a known resistor, and its converter.
+#[derive(Clone, Copy, Debug)]
+pub struct Divider {
+    /// The known resistor, Ω.
+    pub reference_ohm: f64,
+    /// True if the sensor lies between the supply and the pin, false if between the pin and ground.
+    pub is_high: bool,
+    /// Largest code.
+    pub full: f64,
 }
 
 impl HandJoint<'_> {
@@ -72,21 +83,17 @@ impl HandFirmware {
     /// Exports all joints of a hand, each channel with the default estimator of its sensor, for readings every `dt_s` seconds.
     ///
     /// # Errors
-    /// See [`ExportError`]; also if two channels have the same name in C.
+    /// See [`ExportError`]; also if two joints or two channels have the same name in C.
     pub fn new(joints: &[HandJoint], dt_s: f64, prefix: &Prefix) -> Result<Self, ExportError> {
         let plan = Plan::default();
         let hand = HandConstants::new(joints, &plan, dt_s)?;
         let mut exported = Vec::new();
         for (name, channel) in hand.channel_names().zip(joints.iter().flat_map(|joint| &joint.channels)) {
-            let of_channel: Prefix = name.parse().map_err(ExportError::Parameter)?;
-            if of_channel == *prefix {
-                return Err(ExportError::Parameter(format!(
-                    "column `{}`: its name in C is that of the hand",
-                    channel.column
-                )));
-            }
-            let promise = Promise::new(channel.params, &plan, dt_s, None, None)?;
-            let all = files(channel.params, &plan, ExportTarget::C, dt_s, &of_channel, &promise.lines)?;
+            let of_column =
+                |error: ExportError| ExportError::Parameter(format!("column `{}`: {error}", channel.column));
+            let promise = Promise::new(channel.params, &plan, dt_s, None, None).map_err(of_column)?;
+            let part = prefix.of_part(name);
+            let all = files(channel.params, &plan, ExportTarget::C, dt_s, &part, &promise.lines).map_err(of_column)?;
             exported.extend(all.into_iter().filter(|file| file.path.starts_with("src/")));
         }
         let mut environment = environment()?;

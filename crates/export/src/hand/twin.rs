@@ -101,6 +101,10 @@ impl Twin {
             }
         }
         let (effect, readings, rows) = calmest.unwrap_or_default();
+        if !effect.is_finite() {
+            let what = "rounding decides which channel is left out, wherever the self-test begins";
+            return Err(ExportError::Parameter(what.into()));
+        }
         Ok(HandVectors {
             readings: (0..ROWS).map(|k| readings.iter().map(|of_channel| literal(of_channel[k])).collect()).collect(),
             expected: (0..ROWS).map(|k| self.expected(&rows, k)).collect(),

@@ -82,8 +82,8 @@ class HandFilter:
     def step(self, time_s: float, readings: Mapping[str, float | None]) -> dict[str, Any]:
         """Take the readings at a time, s, by their columns; one that is missing is None, NaN or not there.
 
-        The result has the columns of :meth:`Hand.filter`. Electronics in ``hand.toml`` are for recordings: a live filter takes ohms or
-        ratios, as the sensor was calibrated.
+        The result has the columns of :meth:`Hand.filter`. ``front_end`` and ``joint`` in ``hand.toml``, and ``rest_resistance`` of fused
+        channels, are for recordings, and refused here: a live filter takes ohms or ratios, as the sensors were calibrated.
         """
         row: dict[str, Any] = {"time_s": time_s}
         flags = []
@@ -140,6 +140,8 @@ class _Joint:
         """Create a filter for live readings."""
         if self.spec is not None:
             raise _core.OhmstrainError(f"joint `{self.name}`: `joint` in hand.toml is for recordings, not for a live filter")
+        if any(channel["front_end"] is not None for channel in self.channels):
+            raise _core.OhmstrainError(f"joint `{self.name}`: `front_end` in hand.toml is for recordings, not for a live filter")
         rested = [channel["rest_resistance"] for channel in self.channels]
         if self.fused is None:
             return self.sensors[0].filter(rest_resistance=rested[0])

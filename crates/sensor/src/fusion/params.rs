@@ -110,6 +110,9 @@ impl FusionParams {
             return Err(root.wrong("rows", "at least one", 0));
         }
         root.numbers("low_pass_s", &self.low_pass_s, POSITIVE)?;
+        if self.low_pass_s.is_empty() {
+            return Err(root.wrong("low_pass_s", "at least one", 0));
+        }
         self.errors.validate(&root.table("errors"), self.members())?;
         self.filters.iter().try_for_each(|errors| errors.validate(&root.table("filters"), self.channels()))?;
         self.smoothers.iter().try_for_each(|errors| errors.validate(&root.table("smoothers"), self.members()))?;

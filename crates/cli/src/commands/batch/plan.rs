@@ -219,6 +219,13 @@ fn check_arguments(job: &mut Job, args: &BatchArgs) -> Result<(), CliError> {
     if job.files.iter().any(|file| file == Path::new("-")) {
         return Err(CliError::Arguments("batch reads files; for standard input there is the command itself".into()));
     }
+    if args.command == BatchCommand::Hand && job.sensor.is_none() {
+        let what = "expected the hand.toml as --sensor, or in the manifest's column `sensor`";
+        return Err(CliError::Arguments(format!("{}: {what}", job.name())));
+    }
+    if args.command == BatchCommand::Hand && args.format == Format::Parquet {
+        return Err(CliError::Arguments("--format parquet is for one sensor, not for a hand.toml".into()));
+    }
     let parsed = job.parsed(args).map_err(|error| {
         let text = error.to_string();
         let text = text.lines().map(str::trim).take_while(|line| !line.is_empty()).collect::<Vec<_>>().join(" ");

@@ -156,10 +156,8 @@ fn run_command(command: Command, draft: &Path, entry: &mut Entry, messages: &Mes
         {
             let hand = args.calibration.sensor.clone().unwrap_or_default();
             hand::evaluate::run(&args, &hand, |name, scores| {
-                entry.rows = scores
-                    .first()
-                    .and_then(|joint| joint.fused.as_ref())
-                    .and_then(|scores| u64::try_from(scores.n).ok());
+                entry.figures = scores.first().map(Figures::of_joint).unwrap_or_default();
+                entry.rows = entry.figures.rows;
                 let mut text = Vec::new();
                 hand::scores::write(&mut text, name, scores, args.json)?;
                 fs::write(draft, text).map_err(|error| CliError::file("write", draft, &error))

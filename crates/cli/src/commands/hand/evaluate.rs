@@ -3,8 +3,8 @@
 use ohmstrain_report::Scored;
 use std::path::Path;
 
-use ohmstrain::trace::TraceFile;
-use ohmstrain::{Reading, ScoredRow, score};
+use ohmstrain::trace::{HandChannel, TraceFile};
+use ohmstrain::{Error, Reading, ScoredRow, StepError, score};
 use ohmstrain_bench_data::Metadata;
 
 use super::description;
@@ -33,7 +33,7 @@ pub fn run(
     let description = description::read(hand)?;
     for path in &args.traces {
         let Some(table) = Table::read(path)? else {
-            let what = "expected a recording with two or more columns of readings, NAME_ohm or NAME_ratio, as hand.toml names them";
+            let what = "expected a recording with two or more columns of readings, NAME_ohm, NAME_ratio or NAME_adc, as hand.toml names them";
             return Err(CliError::Input(format!("{}: {what}", path.display())));
         };
         let name = path.display().to_string();
@@ -49,18 +49,19 @@ pub fn run(
 /// Scores a joint on the rows of `part`; its filter starts at the first row.
 pub fn scored(mut joint: Joint, table: &Table, overrides: &Metadata, part: Scored) -> Result<JointScores, CliError> {
     let known = table.channels()?;
-    let trace = |column: &str| -> Result<TraceFile, CliError> {
-        let found: Option<&channels::Channel> = known.iter().find(|channel| channel.column == column);
+    let trace = |entry: &HandChannel| -> Result<TraceFile, CliError> {
+        let column = &entry.column;
+        let found: Option<&channels::Channel> = known.iter().find(|channel| channel.column == *column);
         let missing = || {
             let (header, name) = (table.header_name(), joint.name);
             CliError::Input(format!("{header}: joint `{name}`: expected a column `{column}`, found none"))
         };
-        let trace = table.trace(found.ok_or_else(missing)?, overrides)?;
+        let overrides = Metadata { front_end: entry.front_end, ..overrides.clone() };
+        let trace = table.trace(found.ok_or_else(missing)?, &overrides)?;
         trace.check_quantity(joint.quantity())?;
         Ok(trace)
     };
-    let traces: Vec<TraceFile> =
-        joint.channels.iter().map(|channel| trace(&channel.entry.column)).collect::<Result<_, _>>()?;
+    let traces: Vec<TraceFile> = joint.channels.iter().map(|channel| trace(channel.entry)).collect::<Result<_, _>>()?;
     let time_s = traces.first().map_or_else(Vec::new, |trace| trace.trace.time_s.clone());
     let readings: Vec<Vec<Reading>> =
         traces.iter().map(|trace| (0..time_s.len()).map(|row| trace.reading(row).1).collect()).collect();
@@ -70,7 +71,10 @@ pub fn scored(mut joint: Joint, table: &Table, overrides: &Metadata, part: Score
     };
     let filtered: Vec<JointRow> = (0..time_s.len()).map(step).collect::<Result<_, _>>()?;
     // Not every estimator has a smoother.
-    let smoothed = joint.smooth(&time_s, &readings.iter().map(Vec::as_slice).collect::<Vec<_>>()).unwrap_or_default();
+    let smoothed = match joint.smooth(&time_s, &readings.iter().map(Vec::as_slice).collect::<Vec<_>>()) {
+        Err(Error::NoFusedSmoother | Error::Step(StepError::NoSmoother)) => Vec::new(),
+        smoothed => smoothed?,
+    };
     let score = |rows: &[JointRow], of: &dyn Fn(&JointRow) -> (f64, f64)| {
         let judged = |(k, row): (usize, &JointRow)| {
             let (strain, sd) = of(row);

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use ohmstrain::SensorParams;
 use ohmstrain_bench_data::FrontEndSpec;
-use ohmstrain_export::{ExportTarget, HandChannel, HandFirmware, HandJoint};
+use ohmstrain_export::{Divider, ExportTarget, HandChannel, HandFirmware, HandJoint};
+use ohmstrain_model::SensorSide;
 
 use super::description;
 use super::joint::Joint;
@@ -55,8 +56,11 @@ fn exported<'j>(joint: &'j Joint) -> HandJoint<'j> {
         column: one.entry.column.clone(),
         params: one.sensor.params(),
         rest_resistance: one.rest_resistance,
-        series_ohm: match one.entry.front_end {
-            Some(FrontEndSpec::Divider { reference_ohm, .. }) => Some(reference_ohm),
+        divider: match one.entry.front_end {
+            Some(FrontEndSpec::Divider { reference_ohm, side, bits, .. }) => {
+                let full = f64::from(bits).exp2() - 1.0;
+                Some(Divider { reference_ohm, is_high: side == SensorSide::High, full })
+            }
             _ => None,
         },
     };

@@ -4,14 +4,11 @@ use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
-use ohmstrain_bench_data::{Line, Row};
+use ohmstrain_bench_data::{Line, ParquetText, Row};
 
 use super::joint::{Channel, Joint};
 use crate::error::CliError;
 use crate::whole_file::is_stdin;
-
-/// Advice for a clock that has restarted.
-const LATE: &str = "; if the clock has started again there, --skip-bad goes on with other filters";
 
 /// Longest line, bytes; anything longer is not a row.
 const LONGEST_LINE: u64 = 64 * 1024;
@@ -30,22 +27,18 @@ pub struct Taken {
 }
 
 /// Parser of all channels' lines.
-#[derive(Default)]
 pub struct HandParser {
     header: Option<String>,
-    /// True if the header may come again, from a device that has restarted.
-    repeats: bool,
+    /// True for a stream of a device: it may be joined within a line, and its header may come again.
+    is_stream: bool,
+    /// Advice where the clock has restarted.
+    late: &'static str,
 }
 
 impl HandParser {
-    /// Creates a parser that waits for a header.
-    pub fn new(repeats: bool) -> Self {
-        Self { header: None, repeats }
-    }
-
-    /// True once the header is known.
-    pub const fn has_header(&self) -> bool {
-        self.header.is_some()
+    /// Creates a parser that waits for a header; `late` is advice where the clock has restarted.
+    pub fn new(is_stream: bool, late: &'static str) -> Self {
+        Self { header: None, is_stream, late }
     }
 
     /// Parses a line; `place` is its place in messages.
@@ -55,13 +48,18 @@ impl HandParser {
     pub fn take(&mut self, line: &[u8], place: &str, joints: &mut [Joint]) -> Result<Taken, CliError> {
         let text = String::from_utf8_lossy(line);
         let is_first = self.header.is_none() && !text.starts_with('#') && !text.trim().is_empty();
-        let is_header = is_first || (self.repeats && self.header.as_deref() == Some(text.trim()));
+        let is_header = is_first || (self.is_stream && self.header.as_deref() == Some(text.trim()));
         let mut taken = Taken { is_first, restarted: is_header && !is_first, ..Taken::default() };
         for channel in channels(joints) {
             let result = if is_header {
-                let own = channel.header(text.trim());
-                let own = own.map_err(|what| CliError::Input(format!("{place}: {what}")))?;
-                channel.lines.take(own.as_bytes())
+                match channel.header(text.trim()) {
+                    Ok(own) => channel.lines.take(own.as_bytes()),
+                    // The rest of a line, as after opening a port late, is no header.
+                    Err(what) if self.is_stream && !has_time(&text) => {
+                        return Ok(Taken { refused: Some(format!("{place}: {what}")), ..Taken::default() });
+                    }
+                    Err(what) => return Err(CliError::Input(format!("{place}: {what}"))),
+                }
             } else {
                 channel.lines.take(line)
             };
@@ -73,12 +71,12 @@ impl HandParser {
                 }
                 Ok(_) => {}
                 Err(fault) => {
-                    let hint = if fault.is_late { LATE } else { "" };
+                    let hint = if fault.is_late { self.late } else { "" };
                     taken.refused = Some(format!("joint `{}`: {fault}{hint}", channel.joint));
                 }
             }
         }
-        if is_first {
+        if is_first && taken.refused.is_none() {
             self.header = Some(text.trim().to_owned());
         }
         // A line that one channel cannot read is a row for none.
@@ -87,6 +85,11 @@ impl HandParser {
         }
         Ok(taken)
     }
+}
+
+/// True if a line names a column of times.
+fn has_time(text: &str) -> bool {
+    text.split(',').any(|cell| matches!(cell.trim(), "time_s" | "time_us"))
 }
 
 /// Returns the channels of all joints.
@@ -113,21 +116,26 @@ impl HandLines {
     ///
     /// # Errors
     /// If it cannot be read.
-    pub fn open(path: &Path, repeats: bool) -> Result<Self, CliError> {
+    pub fn open(path: &Path, parser: HandParser) -> Result<Self, CliError> {
         let (file, source): (String, Box<dyn Read>) = if is_stdin(path) {
             ("stdin".into(), Box::new(io::stdin()))
         } else {
             let file = File::open(path).map_err(|error| CliError::file("read", path, &error))?;
             (path.display().to_string(), Box::new(file))
         };
+        let mut source = BufReader::new(source);
+        if source.fill_buf().is_ok_and(ParquetText::is_one) {
+            let what = "expected text: a recording of several channels is not read from Parquet";
+            return Err(CliError::Input(format!("{file}: {what}")));
+        }
         Ok(Self {
             path: path.into(),
             file,
             is_live: is_stdin(path) || !path.is_file(),
-            source: BufReader::new(source),
+            source,
             line: Vec::new(),
             number: 0,
-            parser: HandParser::new(repeats),
+            parser,
         })
     }
 

@@ -21,12 +21,15 @@ use crate::error::CliError;
 use crate::messages::Messages;
 use crate::output::RowsOut;
 use joint::{Joint, JointRow};
-use lines::{HandLines, channels};
+use lines::{HandLines, HandParser, channels};
+
+/// Advice for a clock that has restarted.
+const LATE: &str = "; if the clock has started again there, --skip-bad goes on with other filters";
 
 /// Turns readings of all joints into angles, row by row as they arrive; returns the number of rows.
 pub fn run(args: &HandArgs, messages: &Messages) -> Result<u64, CliError> {
     let description = description::read(&args.hand)?;
-    let mut lines = HandLines::open(&args.trace_file, args.skip_bad)?;
+    let mut lines = HandLines::open(&args.trace_file, HandParser::new(args.skip_bad, LATE))?;
     let mut joints = joints(&description, &args.hand, &lines.file)?;
     let inputs = std::iter::once(args.trace_file.clone()).chain(description.files(&args.hand));
     let columns = columns(&joints);

@@ -5,12 +5,15 @@ use ohmstrain_bench_data::RowWriter;
 
 use super::description;
 use super::joint::JointRow;
-use super::lines::{HandLines, channels};
+use super::lines::{HandLines, HandParser, channels};
 use super::{columns, doubt, header, joints, refuse_estimate, refuse_flags, write};
 use crate::args::{Format, SmoothArgs};
 use crate::error::CliError;
 use crate::messages::Messages;
 use crate::output::RowsOut;
+
+/// Advice for a clock that has restarted.
+const LATE: &str = "; if the clock has started again there, give each part a file of its own";
 
 /// Smooths the readings of all joints, writes all angles or none, and returns the number of rows. The whole recording is in memory.
 pub fn run(args: &SmoothArgs, messages: &Messages) -> Result<u64, CliError> {
@@ -19,7 +22,7 @@ pub fn run(args: &SmoothArgs, messages: &Messages) -> Result<u64, CliError> {
     let parquet = written.format() == Format::Parquet;
     refuse_flags([("--columns", !written.columns.is_empty()), ("--format parquet", parquet)])?;
     let description = description::read(hand)?;
-    let mut lines = HandLines::open(&args.trace_file, false)?;
+    let mut lines = HandLines::open(&args.trace_file, HandParser::new(false, LATE))?;
     let mut joints = joints(&description, hand, &lines.file)?;
     let inputs = std::iter::once(args.trace_file.clone()).chain(description.files(hand));
     let columns = columns(&joints);

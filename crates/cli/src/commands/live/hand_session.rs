@@ -13,7 +13,7 @@ use super::recorder::{self, Recorder};
 use super::session::{LEAST_AT_REST, MOST_POINTS, REST_S, recorded};
 use super::{Shown, hand_view};
 use crate::args::LiveArgs;
-use crate::commands::hand::joint::{Joint, JointRow};
+use crate::commands::hand::joint::{Channel, Joint, JointRow};
 use crate::commands::hand::lines::{HandParser, channels};
 use crate::commands::hand::{joints, refuse_estimate, refuse_flags, step};
 use crate::error::CliError;
@@ -60,9 +60,10 @@ impl<'a> HandSession<'a> {
             ("--joint", args.setup.joint.is_some()),
         ])?;
         let mut joints = joints(description, &args.estimate.sensor, &args.port.source())?;
-        let (mut parser, headed) = (HandParser::new(true), Headed::new(args.port.header.as_deref()));
+        let (mut parser, headed) = (HandParser::new(true, ""), Headed::new(args.port.header.as_deref()));
         if let Some(header) = headed.header() {
-            parser.take(header.as_bytes(), "--header", &mut joints)?;
+            let refused = parser.take(header.as_bytes(), "--header", &mut joints)?.refused;
+            refused.map_or(Ok(()), |refused| Err(CliError::Arguments(refused)))?;
         }
         Ok(Self {
             args,
@@ -98,25 +99,28 @@ impl<'a> HandSession<'a> {
     fn new_recorder(&self) -> io::Result<Recorder> {
         let all = || self.joints.iter().flat_map(|joint| &joint.channels);
         let metadata = all().next().map_or_else(Metadata::default, |channel| channel.lines.metadata());
-        // The electronics of each channel are in hand.toml.
-        let metadata = Metadata { front_end: None, ..metadata };
-        Recorder::begin(&self.args.record, metadata, all().map(|channel| channel.entry.column.as_str()))
+        // Electronics that differ are in hand.toml alone.
+        let spec = metadata.front_end.filter(|spec| all().all(|channel| channel.entry.front_end == Some(*spec)));
+        let metadata = Metadata { front_end: spec, ..metadata };
+        let columns: Vec<&str> = all().map(|channel| channel.entry.column.as_str()).collect();
+        Recorder::begin(&self.args.record, metadata, own(&columns).map(|place| columns[place]))
     }
 
     fn record(&mut self, rows: &[Row]) {
         let mark = self.new_mark.take();
         let Some(recorder) = &mut self.recorder else { return };
-        let readings =
-            channels(&mut self.joints).zip(rows).map(|(channel, row)| recorded(row, channel.lines.has_codes()));
+        let all: Vec<&Channel> = self.joints.iter().flat_map(|joint| &joint.channels).collect();
+        let columns: Vec<&str> = all.iter().map(|channel| channel.entry.column.as_str()).collect();
+        let readings = own(&columns).map(|place| recorded(&rows[place], all[place].lines.has_codes()));
         if let Err(error) = recorder.write(rows[0].time_s, readings, mark) {
             self.message = format!("cannot record: {error}");
             self.recorder = None;
         }
     }
 
-    /// Returns the median of a channel's readings in the last second, or of the last few.
+    /// Returns the median of a channel's readings in the last second, or of the last few; `None` if it is not read now.
     fn rested(&self, channel: usize) -> Option<f64> {
-        let last_s = self.points.back()?.time_s;
+        let last_s = self.points.back().filter(|last| last.readings[channel].is_finite())?.time_s;
         let known = || self.points.iter().rev().filter(|point| point.readings[channel].is_finite());
         let recent: Vec<f64> =
             known().take_while(|point| point.time_s >= last_s - REST_S).map(|point| point.readings[channel]).collect();
@@ -125,22 +129,17 @@ impl<'a> HandSession<'a> {
     }
 }
 
+/// Returns the places of columns that no earlier one repeats: two joints may share a column.
+fn own<'c>(columns: &'c [&str]) -> impl Iterator<Item = usize> + 'c {
+    (0..columns.len()).filter(|place| !columns[..*place].contains(&columns[*place]))
+}
+
 impl Taker for HandSession<'_> {
     type Row = Vec<Row>;
 
     fn parse(&mut self, line: &[u8], arrived: Instant) -> Result<Option<Due<Vec<Row>>>, CliError> {
         let line = self.headed.line(line, arrived);
-        let had_header = self.parser.has_header();
-        let taken = match self.parser.take(&line, &self.args.port.source(), &mut self.joints) {
-            Ok(taken) => taken,
-            // The rest of a line, as after opening a port late, is not a header.
-            Err(CliError::Input(what)) if !had_header => {
-                self.pulse.counts.bad_lines += 1;
-                self.message = what;
-                return Ok(None);
-            }
-            Err(error) => return Err(error),
-        };
+        let taken = self.parser.take(&line, &self.args.port.source(), &mut self.joints)?;
         if let Some(refused) = taken.refused {
             self.pulse.counts.bad_lines += 1;
             self.message = format!("skipped {refused}");
@@ -189,24 +188,30 @@ impl Taker for HandSession<'_> {
 }
 
 impl Shown for HandSession<'_> {
-    /// Makes the readings R₀ of each channel, and all strains zero.
+    /// Makes the readings R₀ of each channel, and the strains of their joints zero; a joint with a channel that is not read, or whose reading
+    /// cannot be its R₀, stays as it was.
     fn zero(&mut self) -> Result<(), CliError> {
-        let count = channels(&mut self.joints).count();
-        let rested: Vec<Option<f64>> = (0..count).map(|channel| self.rested(channel)).collect();
-        let mut refused = Vec::new();
-        for (channel, rested) in channels(&mut self.joints).zip(rested) {
-            let Some(rested) = rested else { continue };
-            match channel.sensor.check_rest_resistance(rested) {
-                Ok(()) => channel.rest_resistance = Some(rested),
-                Err(error) => refused.push(format!("{}: R0 stays as it was: {error}", channel.entry.column)),
-            }
+        if self.points.is_empty() {
+            return Ok(());
         }
-        self.joints.iter_mut().try_for_each(Joint::start_at_zero)?;
-        self.message = if refused.is_empty() {
-            "R0 of each channel is its median of the last second".into()
-        } else {
-            refused.join("; ")
-        };
+        let count = channels(&mut self.joints).count();
+        let mut rested = (0..count).map(|channel| self.rested(channel)).collect::<Vec<_>>().into_iter();
+        let mut refused = Vec::new();
+        for joint in &mut self.joints {
+            let own: Vec<Option<f64>> = rested.by_ref().take(joint.channels.len()).collect();
+            let check = |(channel, rested): (&Channel, &Option<f64>)| match rested {
+                Some(rested) => channel.sensor.check_rest_resistance(*rested).err().map(|error| error.to_string()),
+                None => Some(format!("{}: no reading", channel.entry.column)),
+            };
+            if let Some(why) = joint.channels.iter().zip(&own).find_map(check) {
+                refused.push(format!("{} stays as it was: {why}", joint.name));
+                continue;
+            }
+            joint.channels.iter_mut().zip(own).for_each(|(channel, rested)| channel.rest_resistance = rested);
+            joint.start_at_zero()?;
+        }
+        let all = "R0 of each channel is its median of the last second";
+        self.message = if refused.is_empty() { all.into() } else { refused.join("; ") };
         Ok(())
     }
 

@@ -358,7 +358,7 @@ static void report(ohmstrain_state *state)
 {% for joint in joints %}
     {
         << joint.first >>_estimate estimate;
-        << joint.first >>_get(&state-><< joint.first >>_filter, &estimate);
+        << joint.first >>_get(&state-><< joint.first_stem >>_filter, &estimate);
         set(state, << loop.index0 >>, estimate.strain, estimate.strain_sd, << joint.at_zero >>f, << joint.per_strain >>f);
     }
 {% endfor %}
@@ -388,13 +388,13 @@ ohmstrain_status ohmstrain_start(ohmstrain_state *state)
         return OHMSTRAIN_ERR_ARGUMENT;
     }
 {% for channel in channels %}
-    status = first_of(status, << channel.name >>_start(&state-><< channel.name >>_filter));
+    status = first_of(status, << channel.name >>_start(&state-><< channel.stem >>_filter));
 {% if channel.rest %}
-    status = first_of(status, << channel.name >>_rest(&state-><< channel.name >>_filter, << channel.rest >>f));
+    status = first_of(status, << channel.name >>_rest(&state-><< channel.stem >>_filter, << channel.rest >>f));
 {% endif %}
 {% endfor %}
 {% for fusion in fusions %}
-    forget(&state-><< fusion.joint >>_fusion);
+    forget(&state-><< fusion.joint >>_low_passes);
 {% endfor %}
     report(state);
     return status;
@@ -407,8 +407,8 @@ ohmstrain_status ohmstrain_rest(ohmstrain_state *state, enum ohmstrain_channel c
     }
     switch (channel) {
 {% for channel in channels %}
-    case OHMSTRAIN_CHANNEL_<< channel.upper >>:
-        return (ohmstrain_status)<< channel.name >>_rest(&state-><< channel.name >>_filter, measured);
+    case OHMSTRAIN_CHANNEL_<< channel.label >>:
+        return (ohmstrain_status)<< channel.name >>_rest(&state-><< channel.stem >>_filter, measured);
 {% endfor %}
     default:
         return OHMSTRAIN_ERR_ARGUMENT;
@@ -423,10 +423,10 @@ ohmstrain_status ohmstrain_rezero(ohmstrain_state *state, const float measured[O
         return OHMSTRAIN_ERR_ARGUMENT;
     }
 {% for channel in channels %}
-    status = first_of(status, << channel.name >>_rezero(&state-><< channel.name >>_filter, measured[OHMSTRAIN_CHANNEL_<< channel.upper >>]));
+    status = first_of(status, << channel.name >>_rezero(&state-><< channel.stem >>_filter, measured[OHMSTRAIN_CHANNEL_<< channel.label >>]));
 {% endfor %}
 {% for fusion in fusions %}
-    forget(&state-><< fusion.joint >>_fusion);
+    forget(&state-><< fusion.joint >>_low_passes);
 {% endfor %}
     report(state);
     return status;
@@ -441,16 +441,19 @@ ohmstrain_status ohmstrain_step_after(ohmstrain_state *state, float dt_s, const 
                                       const float *reading_sd)
 {
     ohmstrain_status status = OHMSTRAIN_OK;
+    int taken[OHMSTRAIN_CHANNELS];
 
-    if (!state || !reading) {
+    /* Not a number, too. */
+    if (!state || !reading || !(dt_s >= 0.0f && dt_s < INFINITY)) {
         return OHMSTRAIN_ERR_ARGUMENT;
     }
 {% for channel in channels %}
     {
-        const float r = reading[OHMSTRAIN_CHANNEL_<< channel.upper >>];
-        << channel.name >>_state *const filter = &state-><< channel.name >>_filter;
-        const float sd = reading_sd ? reading_sd[OHMSTRAIN_CHANNEL_<< channel.upper >>] : 0.0f;
-        status = first_of(status, r == r ? << channel.name >>_step_after(filter, dt_s, r, sd, 0) : << channel.name >>_predict_for(filter, dt_s));
+        const float r = reading[OHMSTRAIN_CHANNEL_<< channel.label >>];
+        << channel.name >>_state *const filter = &state-><< channel.stem >>_filter;
+        const float sd = reading_sd ? reading_sd[OHMSTRAIN_CHANNEL_<< channel.label >>] : 0.0f;
+        taken[OHMSTRAIN_CHANNEL_<< channel.label >>] = r == r ? << channel.name >>_step_after(filter, dt_s, r, sd, 0) : << channel.name >>_predict_for(filter, dt_s);
+        status = first_of(status, taken[OHMSTRAIN_CHANNEL_<< channel.label >>]);
     }
 {% endfor %}
     report(state);
@@ -462,27 +465,27 @@ ohmstrain_status ohmstrain_step_after(ohmstrain_state *state, float dt_s, const 
         unsigned long flags = 0;
 {% for channel in joint.channels %}
         {
-            const float r = reading[OHMSTRAIN_CHANNEL_<< channel.upper >>];
+            const float r = reading[OHMSTRAIN_CHANNEL_<< channel.label >>];
             << channel.name >>_estimate estimate;
-            << channel.name >>_get(&state-><< channel.name >>_filter, &estimate);
+            << channel.name >>_get(&state-><< channel.stem >>_filter, &estimate);
             flags |= estimate.flags;
             /* What its own filter turns down, or could not take, is no reading. */
-            channels[<< loop.index0 >>].ln_r = r > 0.0f && !(estimate.flags & (<< channel.upper >>_MISSING | << channel.upper >>_IMPLAUSIBLE | << channel.upper >>_STUCK))
-                ? logf(r / state-><< channel.name >>_filter.rest_reading) : NAN;
+            channels[<< loop.index0 >>].ln_r = taken[OHMSTRAIN_CHANNEL_<< channel.label >>] == 0 && r > 0.0f && !(estimate.flags & (<< channel.upper >>_MISSING | << channel.upper >>_IMPLAUSIBLE | << channel.upper >>_STUCK))
+                ? logf(r / state-><< channel.stem >>_filter.rest_reading) : NAN;
             channels[<< loop.index0 >>].strain = estimate.strain;
             channels[<< loop.index0 >>].sd = estimate.strain_sd;
         }
 {% endfor %}
-        result = fuse(&<< joint.name >>_constants, &state-><< joint.name >>_fusion, dt_s, channels);
+        result = fuse(&<< joint.name >>_constants, &state-><< joint.name >>_low_passes, dt_s, channels);
         set(state, << loop.index0 >>, result.strain, result.sd, << joint.at_zero >>f, << joint.per_strain >>f);
         flags |= (result.faulty >= 0 ? OHMSTRAIN_FAULTY : 0UL) | (result.is_unlike ? OHMSTRAIN_UNLIKE : 0UL);
         state->flags[<< loop.index0 >>] = flags;
-        state->faulty[<< loop.index0 >>] = result.faulty >= 0 ? OHMSTRAIN_CHANNEL_<< joint.channels[0].upper >> + result.faulty : -1;
+        state->faulty[<< loop.index0 >>] = result.faulty >= 0 ? OHMSTRAIN_CHANNEL_<< joint.channels[0].label >> + result.faulty : -1;
     }
 {% else %}
     {
         << joint.first >>_estimate estimate;
-        << joint.first >>_get(&state-><< joint.first >>_filter, &estimate);
+        << joint.first >>_get(&state-><< joint.first_stem >>_filter, &estimate);
         state->flags[<< loop.index0 >>] = estimate.flags;
     }
 {% endif %}

@@ -27,7 +27,7 @@ extern "C" {
 /* Channels, in the order of the readings. */
 enum ohmstrain_channel {
 {% for channel in channels %}
-    OHMSTRAIN_CHANNEL_<< channel.upper >> = << loop.index0 >>, /* << channel.column >>, << channel.unit >> */
+    OHMSTRAIN_CHANNEL_<< channel.label >> = << loop.index0 >>, /* << channel.column >>, << channel.unit >> */
 {% endfor %}
     OHMSTRAIN_CHANNELS = << channels|length >>
 };
@@ -48,7 +48,7 @@ typedef enum ohmstrain_status {
 } ohmstrain_status;
 
 /* Flags of a joint: those of its channels, which all of their headers list, and these. */
-enum ohmstrain_joint_flag {
+enum {
     /* A channel disagrees with all others, and is left out. */
     OHMSTRAIN_FAULTY = 65536,
     /* The readings together are unlike any of the calibration: the interval is nearly that of an unknown value. */
@@ -76,10 +76,10 @@ typedef struct ohmstrain_fusion {
 /* What the filters know; the caller owns it. */
 typedef struct ohmstrain_state {
 {% for channel in channels %}
-    << channel.name >>_state << channel.name >>_filter;
+    << channel.name >>_state << channel.stem >>_filter;
 {% endfor %}
 {% for fusion in fusions %}
-    ohmstrain_fusion << fusion.joint >>_fusion;
+    ohmstrain_fusion << fusion.joint >>_low_passes;
 {% endfor %}
     float value[OHMSTRAIN_JOINTS];
     float sd[OHMSTRAIN_JOINTS];

@@ -11,6 +11,8 @@
 #include "ohmstrain.h"
 
 enum { LONGEST_LINE = 65536 };
+/* What UTF-8 text of some programs begins with. */
+static const char MARK[] = "\xEF\xBB\xBF";
 
 static const char *const COLUMN[OHMSTRAIN_CHANNELS] = {
 {% for channel in channels %}
@@ -52,9 +54,9 @@ int main(void)
     while (fgets(line, sizeof line, stdin)) {
         float reading[OHMSTRAIN_CHANNELS];
         double time_s = NAN;
-        char *rest = line, *cell;
+        char *rest = line + (strncmp(line, MARK, strlen(MARK)) == 0 ? strlen(MARK) : 0), *cell;
         int column;
-        if (line[0] == '#' || line[0] == '\n' || line[0] == '\r') {
+        if (rest[0] == '#' || rest[0] == '\n' || rest[0] == '\r') {
             continue;
         }
         for (k = 0; k < OHMSTRAIN_CHANNELS; k++) {
@@ -89,7 +91,10 @@ int main(void)
         if (time_s != time_s) {
             continue;
         }
-        ohmstrain_step_after(&state, has_row ? (float)(time_s - last_s) : OHMSTRAIN_DT_S, reading, 0);
+        if (ohmstrain_step_after(&state, has_row ? (float)(time_s - last_s) : OHMSTRAIN_DT_S, reading, 0) != OHMSTRAIN_OK) {
+            fprintf(stderr, "expected a time after %.9g s and readings, found %.9g s\n", last_s, time_s);
+            return 4;
+        }
         last_s = time_s;
         has_row = 1;
         ohmstrain_get(&state, estimate);

@@ -33,6 +33,7 @@ int main(void)
         }
     }
     failures += ohmstrain_step(0, READING[0], 0) != OHMSTRAIN_ERR_ARGUMENT || ohmstrain_step(&state, 0, 0) != OHMSTRAIN_ERR_ARGUMENT;
+    failures += ohmstrain_step_after(&state, NAN, READING[0], 0) != OHMSTRAIN_ERR_ARGUMENT || ohmstrain_step_after(&state, -1.0f, READING[0], 0) != OHMSTRAIN_ERR_ARGUMENT;
     failures += ohmstrain_rest(&state, OHMSTRAIN_CHANNELS, 1.0f) != OHMSTRAIN_ERR_ARGUMENT;
 #ifndef OHMSTRAIN_SELFTEST_QUIET
     printf("%d rows, largest difference %.2g sd (%.2g allowed), %d failures\n", VECTORS, (double)largest, (double)TOLERANCE_SD, failures);
