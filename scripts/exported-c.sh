@@ -216,7 +216,11 @@ for compiler in "gcc -O2" "gcc -O1 -fsanitize=address,undefined -fno-sanitize-re
     $compiler "${strict[@]}" -I"$hand/src" "$hand"/src/*.c "$hand/selftest/selftest.c" -lm -o "$work/selftest"
     report "hand, $compiler" "$work/selftest"
 done
-g++ -std=gnu++11 -fsyntax-only -Wall -Wextra -Werror -I"$here" -include Arduino.h -I"$hand/src" -x c++ "$hand"/examples/*/*.ino
+g++ -std=c++11 -fsyntax-only -Wall -Wextra -Werror -I"$hand/src" -x c++ "$hand/src/ohmstrain.c"
+for board in AVR ESP32; do
+    g++ -std=gnu++11 -fsyntax-only -Wall -Wextra -Werror "-DARDUINO_ARCH_$board" -I"$here" -include Arduino.h -I"$hand/src" \
+        -x c++ "$hand"/examples/*/*.ino
+done
 gcc -O2 "${strict[@]}" -I"$hand/src" "$hand"/src/*.c "$hand/selftest/replay.c" -lm -o "$work/replay"
 "$work/replay" <"$work/hand.csv" >"$work/c.csv"
 "$ohmstrain" hand "$work/hand.toml" "$work/hand.csv" >"$work/computer.csv"

@@ -39,7 +39,7 @@ typedef struct fusion {
     int channels, rows, low_passes, processes;
     const float *row, *per_sd, *low_pass_s;
     float novelty, lower, upper;
-    const process *process;
+    const process *each;
     errors all, filters;
 } fusion;
 
@@ -322,9 +322,9 @@ static fused fuse(const fusion *f, ohmstrain_fusion *state, float dt_s, const ch
         }
     }
     for (k = 0; has_all && k < f->processes; k++) {
-        predict(&f->process[k], f->channels, ln_r, state, &strain, &variance);
+        predict(&f->each[k], f->channels, ln_r, state, &strain, &variance);
         members[n].place = f->channels + k;
-        members[n].strain = f->process[k].mean_strain + strain * span;
+        members[n].strain = f->each[k].mean_strain + strain * span;
         members[n++].sd = sqrtf(variance * span * span + prior);
     }
     e = has_all ? &f->all : &f->filters;
@@ -478,7 +478,12 @@ ohmstrain_status ohmstrain_step_after(ohmstrain_state *state, float dt_s, const 
 {% endfor %}
         result = fuse(&<< joint.name >>_constants, &state-><< joint.name >>_low_passes, dt_s, channels);
         set(state, << loop.index0 >>, result.strain, result.sd, << joint.at_zero >>f, << joint.per_strain >>f);
-        flags |= (result.faulty >= 0 ? OHMSTRAIN_FAULTY : 0UL) | (result.is_unlike ? OHMSTRAIN_UNLIKE : 0UL);
+        if (result.faulty >= 0) {
+            flags |= OHMSTRAIN_FAULTY;
+        }
+        if (result.is_unlike) {
+            flags |= OHMSTRAIN_UNLIKE;
+        }
         state->flags[<< loop.index0 >>] = flags;
         state->faulty[<< loop.index0 >>] = result.faulty >= 0 ? OHMSTRAIN_CHANNEL_<< joint.channels[0].label >> + result.faulty : -1;
     }
