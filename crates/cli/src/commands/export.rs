@@ -1,3 +1,5 @@
+use std::path::Path;
+
 use ohmstrain_bench_data::Metadata;
 
 use crate::args::ExportArgs;
@@ -9,7 +11,7 @@ use crate::error::CliError;
 use crate::input;
 use crate::output::{Kind, Outputs};
 use crate::sensor_file;
-use ohmstrain_export::{self as export, Compared, ExportError, Promise};
+use ohmstrain_export::{self as export, Compared, ExportError, Promise, SourceFile};
 
 /// Writes a sensor's filter as source code.
 pub fn run(args: &ExportArgs) -> Result<(), CliError> {
@@ -40,15 +42,21 @@ pub fn run(args: &ExportArgs) -> Result<(), CliError> {
     let files =
         export::files(params, &plan, args.target.into(), dt_s, &args.prefix, &promise.lines).map_err(refused)?;
     let mut outputs = Outputs::new(args.force, std::iter::once(&args.sensor).chain(&args.score));
+    put(&mut outputs, &args.output, files)?;
+    // Printed after the outputs are claimed and before anything is written to them: it may refuse.
+    print_promise(args, &lines, &promise, worse_on)?;
+    outputs.publish()
+}
+
+/// Puts files of source code below a folder.
+pub fn put(outputs: &mut Outputs, folder: &Path, files: Vec<SourceFile>) -> Result<(), CliError> {
     for file in files {
-        let path = args.output.join(&file.path);
+        let path = folder.join(&file.path);
         if let Some(folder) = path.parent() {
             outputs.folder(folder)?;
         }
         let output = outputs.claim(&path, Kind::Source)?;
         outputs.put(output, file.content);
     }
-    // Printed after the outputs are claimed and before anything is written to them: it may refuse.
-    print_promise(args, &lines, &promise, worse_on)?;
-    outputs.publish()
+    Ok(())
 }

@@ -75,7 +75,7 @@ const TEMPLATES: [(&str, &str); 10] = [
     ("selftest/vectors.h", include_str!("../templates/hand/vectors.h")),
     ("selftest/selftest.c", include_str!("../templates/hand/selftest.c")),
     ("selftest/replay.c", include_str!("../templates/hand/replay.c")),
-    ("CMakeLists.txt", include_str!("../templates/hand/CMakeLists.txt")),
+    ("CMakeLists.txt", include_str!("../templates/CMakeLists.txt")),
     ("README.md", include_str!("../templates/hand/readme.md")),
 ];
 

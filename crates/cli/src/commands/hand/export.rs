@@ -11,9 +11,10 @@ use super::description;
 use super::joint::Joint;
 use super::{joints, refuse_flags};
 use crate::args::ExportArgs;
+use crate::commands::export::put;
 use crate::commands::export_choice::usual_step_s;
 use crate::error::CliError;
-use crate::output::{Kind, Outputs, print};
+use crate::output::{Outputs, print};
 
 /// Writes a filter for each channel, their fusion, and what calls them.
 pub fn run(args: &ExportArgs, hand: &Path) -> Result<(), CliError> {
@@ -34,14 +35,7 @@ pub fn run(args: &ExportArgs, hand: &Path) -> Result<(), CliError> {
     let firmware = HandFirmware::new(&exported, dt_s, &args.prefix).map_err(refused)?;
     let files = description.files(hand);
     let mut outputs = Outputs::new(args.force, &files);
-    for file in firmware.files {
-        let path = args.output.join(&file.path);
-        if let Some(folder) = path.parent() {
-            outputs.folder(folder)?;
-        }
-        let output = outputs.claim(&path, Kind::Source)?;
-        outputs.put(output, file.content);
-    }
+    put(&mut outputs, &args.output, firmware.files)?;
     print(|out| firmware.costs.iter().try_for_each(|line| Ok(writeln!(out, "{line}")?)))?;
     outputs.publish()
 }
