@@ -200,9 +200,10 @@ fn recordings_of_one_sensor_are_calibrated_together_and_evaluated() {
     let bench = folder();
     bench.write("manifest.csv", "file,sensor\nin/day 2/a.csv,left\nin/b.csv,left\nin/a.csv,right\n");
     let calibrate = ["-q", "batch", "calibrate", "--manifest", "manifest.csv", "-o", "out", "--summary", "json"];
-    bench.run(&[&calibrate[..], &["--", "--estimator", "ekf"]].concat()).ok();
-    let single = ["calibrate", "in/day 2/a.csv", "in/b.csv", "-o", "single.toml", "--estimator", "ekf"];
-    bench.run(&single).ok();
+    let flags = ["--", "--estimator", "ekf", "--branches", "1"];
+    bench.run(&[&calibrate[..], &flags].concat()).ok();
+    let single = ["calibrate", "in/day 2/a.csv", "in/b.csv", "-o", "single.toml"];
+    bench.run(&[&single[..], &flags[1..]].concat()).ok();
     assert_eq!(bench.read("out/left.toml"), bench.read("single.toml"));
     let rows = summary(&bench);
     assert_eq!((rows.len(), rows[0]["file"].as_str()), (2, Some("in/day 2/a.csv; in/b.csv")));

@@ -74,13 +74,9 @@ fn columns_are_chosen_and_ordered_by_name() {
 
 /// Returns `trace.csv` with other columns, calibrated and filtered.
 fn estimates_of(bench: &Bench, trace: &str) -> Csv {
-    estimates_by("auto", bench, trace)
-}
-
-fn estimates_by(estimator: &str, bench: &Bench, trace: &str) -> Csv {
     bench.write("other.csv", trace);
     let calibrate = ["calibrate", "other.csv", "--until", "60", "--branches", "1", "-o", "other.toml"];
-    bench.run(&[&calibrate[..], &["--estimator", estimator]].concat()).ok();
+    bench.run(&[&calibrate[..], &["--estimator", "ekf"]].concat()).ok();
     Csv::new(&bench.run(&["filter", "other.csv", "--sensor", "other.toml"]).ok())
 }
 
@@ -157,7 +153,7 @@ fn an_angle_with_a_joint_calibrates_strain() {
     };
     let trace = change_rows(&bench.read("trace.csv"), degrees).replace(",strain", ",angle_deg");
     let joint = "# joint = prestrain=0 moment_arm_mm=6 gauge_length_mm=30";
-    assert_angles(&estimates_by("ekf", &bench, &format!("{joint}\n{trace}")), 0.0, 0.2);
+    assert_angles(&estimates_of(&bench, &format!("{joint}\n{trace}")), 0.0, 0.2);
 }
 
 #[test]
@@ -172,7 +168,7 @@ fn converter_codes_become_ohms_and_saturated_ones_are_flagged() {
         _ => {}
     };
     let trace = change_rows(&bench.read("codes.csv"), saturate);
-    let estimates = estimates_by("ekf", &bench, &trace);
+    let estimates = estimates_of(&bench, &trace);
     assert_eq!(estimates.header, ESTIMATES_HEADER);
     let flags = estimates.cells("flags");
     let flagged = |word: &str| -> Vec<usize> {

@@ -1,16 +1,22 @@
 //! `evaluate` with its own calibration: on the first rows of a recording, or on other recordings.
 
-use crate::common::{Bench, CALIBRATED_UNTIL, Csv, SIMULATE, change_rows};
+use crate::common::{Bench, CALIBRATED_UNTIL, Csv, SIMULATE, change_rows, first_rows};
 use serde_json::Value;
 
 /// The names of the baselines in JSON, sorted.
 const BASELINES: [&str; 5] = ["fir_20s", "leaky_bank", "low_pass_mode", "relaxing_modulus", "static_cubic"];
 
-/// A folder with a simulated recording per seed: `1.csv`, `2.csv` and so on.
+/// A folder with a simulated recording of 400 s per seed: `1.csv`, `2.csv` and so on.
 fn simulated(seeds: &[&str]) -> Bench {
+    simulated_for("400", seeds)
+}
+
+/// The same with recordings of this length, s.
+fn simulated_for(duration_s: &str, seeds: &[&str]) -> Bench {
     let bench = Bench::new();
-    for seed in seeds {
-        bench.run(&[&SIMULATE[..], &["--seed", seed, "-o", &format!("{seed}.csv")]].concat()).ok();
+    for &seed in seeds {
+        let of = ["--duration-s", duration_s, "--seed", seed];
+        bench.run(&[&SIMULATE[..], &of, &["-o", &format!("{seed}.csv")]].concat()).ok();
     }
     bench
 }
@@ -47,9 +53,7 @@ fn a_split_is_a_calibration_on_the_first_rows_and_scores_of_the_rest() {
     assert_eq!(trace.len(), 2001);
     let split = evaluate(&bench, &["--split", "0.3", "--estimator", "ekf", "1.csv"]);
     // With --until the sensor would cover the errors of its test.
-    let text = bench.read("1.csv");
-    let before = text.lines().position(|line| line.starts_with(|first: char| first.is_ascii_digit())).unwrap();
-    bench.write("first.csv", text.lines().take(before + rows).map(|line| format!("{line}\n")).collect::<String>());
+    bench.write("first.csv", first_rows(&bench.read("1.csv"), rows));
     bench.run(&["calibrate", "first.csv", "--estimator", "ekf", "-o", "sensor.toml"]).ok();
     let by_hand = evaluate(&bench, &["1.csv", "--sensor", "sensor.toml", "--from", &from]);
     assert_eq!(split.len(), 1);
@@ -67,8 +71,8 @@ fn a_split_is_a_calibration_on_the_first_rows_and_scores_of_the_rest() {
 /// Known strains from the reference add two scores, with a smaller error of the smoother; the score without them is unchanged.
 #[test]
 fn known_strains_are_scored_beside() {
-    let bench = simulated(&["1"]);
-    let flags = ["--split", "0.5", "--estimator", "ekf", "1.csv"];
+    let bench = Bench::calibrated();
+    let flags = ["trace.csv", "--sensor", "sensor.toml", "--from", CALIBRATED_UNTIL];
     let alone = evaluate(&bench, &flags);
     let with_known = evaluate(&bench, &[&flags[..], &["--known-every", "5"]].concat());
     let names: Vec<&Value> = with_known.iter().map(|scores| &scores["known"]).collect();
@@ -84,7 +88,7 @@ fn known_strains_are_scored_beside() {
 /// the second.
 #[test]
 fn settled_readings_are_compared_with_the_ends_of_holds() {
-    let bench = Bench::new();
+    let bench = Bench::calibrated();
     let sensors = [
         ("mismatched.csv", &["--material", "representative", "--mismatched"][..], 1.5),
         ("matched.csv", &["--material", "ecoflex-00-30"], 2.0),
@@ -97,7 +101,7 @@ fn settled_readings_are_compared_with_the_ends_of_holds() {
         assert!(number(&settled, "rmse") <= most * number(&settled, "reading_rmse"), "{settled}");
         assert!(number(&settled, "holds") >= 5.0 && number(&settled, "n") > 1000.0, "{settled}");
     }
-    let table = bench.run(&["evaluate", "--split", "0.5", "--estimator", "ekf", "matched.csv"]).ok();
+    let table = bench.run(&["evaluate", "matched.csv", "--sensor", "sensor.toml"]).ok();
     assert!(table.contains("settled resistance against the last reading of a hold"), "{table}");
 }
 
@@ -165,28 +169,28 @@ fn nothing_but_the_scores_depends_on_the_reference_of_the_test_rows() {
 
 #[test]
 fn some_recordings_train_and_others_test() {
-    let bench = simulated(&["1", "2", "3"]);
+    let bench = simulated_for("120", &["1", "2", "3"]);
     let train = ["--train", "1.csv", "--train", "2.csv", "--estimator", "ekf"];
     let tested = evaluate(&bench, &[&train[..], &["--test", "3.csv", "--test", "1.csv"]].concat());
     bench.run(&["calibrate", "1.csv", "2.csv", "--estimator", "ekf", "-o", "sensor.toml"]).ok();
     let by_hand = evaluate(&bench, &["3.csv", "1.csv", "--sensor", "sensor.toml"]);
     assert_eq!(tested.iter().map(|scores| &scores["file"]).collect::<Vec<_>>(), ["3.csv", "1.csv"]);
     for (tested, by_hand) in tested.iter().zip(&by_hand) {
-        assert_eq!(tested["n"], 2001);
+        assert_eq!(tested["n"], 601);
         assert_same_scores(tested, by_hand);
         assert_eq!(tested["baselines"].as_object().unwrap().len(), BASELINES.len());
         assert!(number(tested, "calibration_s") > 0.0 && tested.get("lag_s").is_none());
     }
     // Scoring from a time on means fewer rows, not another run.
-    let later = evaluate(&bench, &[&train[..], &["--test", "3.csv", "--from", "200"]].concat());
-    let by_hand = evaluate(&bench, &["3.csv", "--sensor", "sensor.toml", "--from", "200"]);
+    let later = evaluate(&bench, &[&train[..], &["--test", "3.csv", "--from", "60"]].concat());
+    let by_hand = evaluate(&bench, &["3.csv", "--sensor", "sensor.toml", "--from", "60"]);
     assert_same_scores(&later[0], &by_hand[0]);
 }
 
 /// Each recording is scored as with the two others in --train; a single recording has no others.
 #[test]
 fn each_recording_is_left_out_in_turn() {
-    let bench = simulated(&["1", "2", "3"]);
+    let bench = simulated_for("120", &["1", "2", "3"]);
     let all = evaluate(&bench, &["--leave-one-out", "--estimator", "ekf", "1.csv", "2.csv", "3.csv"]);
     assert_eq!(all.iter().map(|scores| &scores["file"]).collect::<Vec<_>>(), ["1.csv", "2.csv", "3.csv"]);
     let by_hand = evaluate(&bench, &["--train", "1.csv", "--train", "3.csv", "--test", "2.csv", "--estimator", "ekf"]);
@@ -226,7 +230,7 @@ fn the_table_has_filter_smoother_and_all_baselines_per_recording() {
 
 #[test]
 fn all_estimators_of_a_sensor_file_are_those_it_has_parameters_for() {
-    let bench = simulated(&["1"]);
+    let bench = simulated_for("60", &["1"]);
     bench.run(&["calibrate", "1.csv", "--until", CALIBRATED_UNTIL, "--estimator", "ukf", "-o", "sensor.toml"]).ok();
     let scores = evaluate(&bench, &["1.csv", "--sensor", "sensor.toml", "--estimator", "all"]);
     assert_eq!(scores.iter().map(|scores| &scores["estimator"]).collect::<Vec<_>>(), ["ekf", "ukf"]);
@@ -236,7 +240,7 @@ fn all_estimators_of_a_sensor_file_are_those_it_has_parameters_for() {
 
 #[test]
 fn what_was_scored_before_an_error_is_printed() {
-    let bench = simulated(&["1"]);
+    let bench = simulated_for("120", &["1"]);
     let run = bench.run(&["evaluate", "--split", "0.5", "--estimator", "ekf", "1.csv", "none.csv"]);
     assert_eq!(run.code, Some(1));
     assert!(run.stderr.starts_with("ohmstrain: cannot read none.csv"), "{}", run.stderr);
@@ -245,10 +249,10 @@ fn what_was_scored_before_an_error_is_printed() {
 
 #[test]
 fn check_holds_a_split_to_the_same_promise() {
-    let bench = simulated(&["1"]);
+    let bench = simulated_for("120", &["1"]);
     // Strains that the sensor never had, several deviations from those that it had.
     let other = change_rows(&bench.read("1.csv"), |row, cells| {
-        if row >= 1000 {
+        if row >= 300 {
             cells[2] = (cells[2].parse::<f64>().unwrap() + 1.0).to_string();
         }
     });

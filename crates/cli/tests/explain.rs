@@ -6,7 +6,7 @@ use crate::common::{Bench, SIMULATE};
 fn calibrate_explains_itself_and_changes_nothing() {
     let bench = Bench::new();
     bench.run(&[&SIMULATE[..], &["-o", "trace.csv"]].concat()).ok();
-    let calibrate = ["calibrate", "trace.csv", "--estimator", "ekf", "--until", "120"];
+    let calibrate = ["calibrate", "trace.csv", "--estimator", "ekf", "--branches", "2", "--until", "120"];
     bench.run(&[&calibrate[..], &["-o", "plain.toml"]].concat()).ok();
     let explain = |seed: &str, output: &str| {
         let flags = ["--explain", "--bootstrap", "8", "--seed", seed, "-o", output];

@@ -1,6 +1,6 @@
 //! Reports and figures of `evaluate` and `calibrate`.
 
-use crate::common::{Bench, CALIBRATED_UNTIL, files_in};
+use crate::common::{Bench, CALIBRATED_UNTIL, SIMULATE, assert_one_whole_page, files_in};
 
 #[test]
 fn evaluate_draws_the_part_that_is_scored() {
@@ -67,10 +67,12 @@ fn evaluate_draws_the_part_that_is_scored() {
 #[test]
 fn a_calibration_reports_in_sample_and_says_so() {
     let bench = Bench::new();
-    bench.run(&[&crate::common::SIMULATE[..], &["-o", "trace.csv"]].concat()).ok();
+    bench.run(&[&SIMULATE[..], &["-o", "trace.csv"]].concat()).ok();
     let flags = ["calibrate", "trace.csv", "--until", "60", "--estimator", "ekf", "-o", "sensor.toml"];
     bench.run(&[&flags[..], &["--report", "report.html", "--figures", "figures"]].concat()).ok();
+    assert_eq!(bench.files(), ["figures", "report.html", "sensor.toml", "trace.csv"]);
     let report = bench.read("report.html");
+    assert_one_whole_page(&report);
     for words in ["in-sample", "<dt>Left out</dt>", "<dt>Record next</dt>", "static curve; its error bars"] {
         assert!(report.contains(words), "{words}");
     }

@@ -1,5 +1,7 @@
 //! Priors learned from sensors of one make for the next sensor.
 
+use std::sync::OnceLock;
+
 use crate::common::Bench;
 use serde_json::Value;
 
@@ -17,18 +19,21 @@ const SIMULATE: [&str; 10] = [
 ];
 const CALIBRATED_S: &str = "150";
 
-/// Returns sensors 1 to 4 of a make, calibrated on 150 s, their prior, and a recording of the ninth sensor.
+/// Returns sensors 1 to 4 of a make, calibrated on 150 s, their prior, and a recording of the ninth sensor, made once.
 fn fleet() -> Bench {
-    let bench = Bench::new();
-    for sensor in ["1", "2", "3", "4", "9"] {
-        let trace = format!("{sensor}.csv");
-        bench.run(&[&SIMULATE[..], &["--individual", sensor, "--seed", sensor, "-o", &trace]].concat()).ok();
-        if sensor != "9" {
-            calibrate(&bench, &trace, CALIBRATED_S, &format!("{sensor}.toml"), &[]);
+    static FILES: OnceLock<Vec<(String, String)>> = OnceLock::new();
+    Bench::with(FILES.get_or_init(|| {
+        let bench = Bench::new();
+        for sensor in ["1", "2", "3", "4", "9"] {
+            let trace = format!("{sensor}.csv");
+            bench.run(&[&SIMULATE[..], &["--individual", sensor, "--seed", sensor, "-o", &trace]].concat()).ok();
+            if sensor != "9" {
+                calibrate(&bench, &trace, CALIBRATED_S, &format!("{sensor}.toml"), &[]);
+            }
         }
-    }
-    bench.run(&["-q", "fleet", "fit", "1.toml", "2.toml", "3.toml", "4.toml", "-o", "prior.toml"]).ok();
-    bench
+        bench.run(&["-q", "fleet", "fit", "1.toml", "2.toml", "3.toml", "4.toml", "-o", "prior.toml"]).ok();
+        bench.contents()
+    }))
 }
 
 fn calibrate(bench: &Bench, trace: &str, until_s: &str, sensor: &str, flags: &[&str]) {

@@ -85,7 +85,8 @@ fn times_outside_of_a_recording_are_answered_with_its_range() {
 fn quiet_says_nothing_and_verbose_what_is_done() {
     let bench = Bench::new();
     bench.run(&[&SIMULATE[..], &["-o", "trace.csv"]].concat()).ok();
-    let calibrate = ["calibrate", "trace.csv", "trace.csv", "--until", "60", "--estimator", "ekf", "-o", "sensor.toml"];
+    let quick = ["--until", "60", "--estimator", "ekf", "--branches", "1", "-o", "sensor.toml"];
+    let calibrate = [&["calibrate", "trace.csv", "trace.csv"], &quick[..]].concat();
     let usual = bench.run(&calibrate);
     assert!(usual.warnings.iter().any(|warning| warning.contains("the same rows")), "{:?}", usual.warnings);
     let quiet = bench.run(&[&calibrate[..], &["--quiet"]].concat());
@@ -158,7 +159,8 @@ fn no_table_and_no_help_is_wider_than_a_hundred_columns() {
     }
     narrow(&["plan", "--sensor", "sensor.toml"]);
     narrow(&["refine", "trace.csv", "--sensor", "sensor.toml", "-o", "refined.toml", "--parameters", "reading_sd"]);
-    narrow(&["calibrate", "trace.csv", "--until", "120", "--estimator", "ekf", "--explain", "-o", "new.toml"]);
+    let calibrate = ["calibrate", "trace.csv", "--until", "120", "--estimator", "ekf", "--branches", "1"];
+    narrow(&[&calibrate[..], &["--explain", "-o", "new.toml"]].concat());
     for command in COMMANDS {
         narrow(&[command, "--help"]);
     }

@@ -1,10 +1,10 @@
 //! `calibrate --marks`: strains known at marks, in place of a reference.
 
-use crate::common::{Bench, Csv};
+use crate::common::{Bench, Csv, first_rows};
 
-/// Readings of the bench's recording without its reference.
+/// Readings of the first half of the bench's recording, without its reference.
 fn without_reference(bench: &Bench) -> Csv {
-    let trace = Csv::new(&bench.read("trace.csv"));
+    let trace = Csv::new(&first_rows(&bench.read("trace.csv"), 1000));
     let rows = trace.cells("time_s").into_iter().zip(trace.cells("resistance_ohm"));
     let rows: String = rows.map(|(time_s, ohm)| format!("{time_s},{ohm}\n")).collect();
     bench.write("readings.csv", format!("time_s,resistance_ohm\n{rows}"));

@@ -7,7 +7,7 @@ const ARGUMENTS: i32 = 2;
 const OTHER: i32 = 1;
 
 /// A quick calibration.
-const CALIBRATE: [&str; 7] = ["calibrate", "trace.csv", "--until", "60", "--estimator", "ekf", "-o"];
+const CALIBRATE: [&str; 9] = ["calibrate", "trace.csv", "--until", "60", "--estimator", "ekf", "--branches", "1", "-o"];
 const REFINE: [&str; 7] = ["refine", "trace.csv", "--sensor", "sensor.toml", "--until", "60", "-o"];
 const EXPORT: [&str; 8] = ["export", "--sensor", "sensor.toml", "--target", "rust", "--dt-s", "0.2", "-o"];
 

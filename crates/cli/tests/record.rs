@@ -101,7 +101,7 @@ fn joints_of_a_glove_have_columns_of_their_own() {
     assert_eq!(trace.header, columns);
     let shown = bench.run(&["inspect", "trace.csv", "--front-end", front_end]).ok();
     assert!(shown.ends_with("go on with\nohmstrain calibrate trace.csv -o hand.toml\n"), "{shown}");
-    let run = bench.run(&["calibrate", "trace.csv", "--estimator", "ekf", "-o", "hand.toml"]);
+    let run = bench.run(&["calibrate", "trace.csv", "--estimator", "ekf", "--branches", "1", "-o", "hand.toml"]);
     assert_eq!(run.code, Some(0), "{}", run.stderr);
     assert!(run.stderr.contains("channel `index_adc`: trace.csv: "), "{}", run.stderr);
     assert!(bench.read("hand.toml").contains(&format!("front_end = \"{front_end}\"")), "{}", bench.read("hand.toml"));
@@ -199,6 +199,16 @@ mod on_a_terminal {
         Terminal::new(bench, cargo_bin!("ohmstrain"), &flags)
     }
 
+    /// Returns a port with a device that has sent its header, and the program that records it.
+    #[track_caller]
+    fn begun(bench: &Bench) -> (Port, Terminal) {
+        let mut port = Port::plug_in(&bench.path("port"));
+        let terminal = recorded(bench);
+        terminal.wait_for("connected");
+        port.send("time_s,resistance_ohm\n");
+        (port, terminal)
+    }
+
     /// Returns rows at 10 Hz from a time on.
     fn rows(from: u32, until: u32) -> String {
         (from..until).map(|row| format!("{}.{},{}\n", row / 10, row % 10, 1600 + row % 7)).collect()
@@ -214,10 +224,7 @@ mod on_a_terminal {
     #[test]
     fn a_spoiled_step_is_repeated_and_nothing_of_it_is_known() {
         let bench = short();
-        let mut port = Port::plug_in(&bench.path("port"));
-        let mut terminal = recorded(&bench);
-        terminal.wait_for("connected");
-        port.send("time_s,resistance_ohm\n");
+        let (mut port, mut terminal) = begun(&bench);
         port.send(&rows(0, 60));
         terminal.wait_for("to B in 2 s");
         port.send(&rows(60, 120));
@@ -244,10 +251,7 @@ mod on_a_terminal {
     #[test]
     fn a_port_that_goes_away_loses_nothing() {
         let bench = short();
-        let mut port = Port::plug_in(&bench.path("port"));
-        let terminal = recorded(&bench);
-        terminal.wait_for("connected");
-        port.send("time_s,resistance_ohm\n");
+        let (mut port, terminal) = begun(&bench);
         port.send(&rows(0, 80));
         terminal.wait_for("hold B for 8 s");
         drop(port);
@@ -272,10 +276,8 @@ mod on_a_terminal {
         let bench = short();
         let text = bench.read("protocol.toml");
         bench.write("protocol.toml", &text[..text.find("[[steps]]").unwrap()]);
-        let mut port = Port::plug_in(&bench.path("port"));
-        let mut terminal = recorded(&bench);
+        let (mut port, mut terminal) = begun(&bench);
         terminal.wait_for("mark by hand");
-        port.send("time_s,resistance_ohm\n");
         for (key, from) in [("1", 0), (" ", 20), ("2", 40), ("2", 60)] {
             port.send(&rows(from, from + 10));
             terminal.wait_for(&format!("{} rows", from / 2 + 10));
@@ -298,10 +300,7 @@ mod on_a_terminal {
     #[test]
     fn marks_by_hand_outlast_a_step_that_is_spoiled_later() {
         let bench = short();
-        let mut port = Port::plug_in(&bench.path("port"));
-        let mut terminal = recorded(&bench);
-        terminal.wait_for("connected");
-        port.send("time_s,resistance_ohm\n");
+        let (mut port, mut terminal) = begun(&bench);
         port.send(&rows(0, 90));
         terminal.wait_for("90 rows");
         terminal.press("2");
@@ -325,10 +324,7 @@ mod on_a_terminal {
     #[test]
     fn any_size_of_terminal_will_do() {
         let bench = planned();
-        let mut port = Port::plug_in(&bench.path("port"));
-        let terminal = recorded(&bench);
-        terminal.wait_for("connected");
-        port.send("time_s,resistance_ohm\n");
+        let (mut port, terminal) = begun(&bench);
         port.send(&rows(0, 250));
         terminal.wait_for("where the body should be");
         for (rows, cols) in [(3, 10), (1, 1), (12, 60), (200, 20), (30, 110)] {

@@ -45,7 +45,7 @@ fn what_is_not_made_of_estimates_stays() {
         assert_eq!(bench.run(&estimate(command, &["-o", "none/new.csv"])).code, Some(1));
     }
     assert!(bench.read("trace.csv") == trace && bench.read("other.csv") == trace);
-    assert_eq!(bench.files(), ["other.csv", "sensor.toml", "trace.csv"]);
+    assert_eq!(bench.files(), ["closing.json", "other.csv", "sensor.toml", "trace.csv"]);
     bench.run(&estimate("filter", &["-o", "other.csv", "--force"])).ok();
     assert!(bench.read("other.csv").starts_with(ESTIMATES_HEADER));
 }
@@ -67,7 +67,7 @@ fn rows_of_a_broken_recording_and_of_a_broken_stream() {
     let rows = bench.read("estimates.csv");
     // The same rows, whatever other columns accompany them.
     assert!(rows.starts_with(ESTIMATES_HEADER) && rows == before, "{}", rows.lines().count());
-    assert_eq!(bench.files(), ["estimates.csv", "sensor.toml", "trace.csv"]);
+    assert_eq!(bench.files(), ["closing.json", "estimates.csv", "sensor.toml", "trace.csv"]);
 }
 
 #[cfg(unix)]

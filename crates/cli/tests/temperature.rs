@@ -1,27 +1,31 @@
 //! Recordings with temperatures: calibration, filter, and exported code.
 
 use std::path::PathBuf;
+use std::sync::OnceLock;
 
 use crate::common::{Bench, Csv};
 use crate::export::{compile_and_run, compilers};
 
 /// Returns a folder with a sensor of the fastest estimator, calibrated in a climate chamber, and its recording with and without the column
-/// of temperatures.
+/// of temperatures, made once.
 fn chamber() -> Bench {
-    let bench = Bench::new();
-    let simulate =
-        "simulate --protocol mixed --duration-s 1200 --sample-rate-hz 2 --speed-mm-s 5 --material representative";
-    let words: Vec<&str> = simulate.split(' ').collect();
-    bench.run(&[&words[..], &["--chamber", "period_s=400 rest_per_k=0.004", "-o", "trace.csv"]].concat()).ok();
-    let blind = |line: &str| match line.rsplit_once(',') {
-        Some((left, _)) if !line.starts_with('#') => left.to_owned(),
-        _ => line.to_owned(),
-    };
-    bench.write("blind.csv", bench.read("trace.csv").lines().map(blind).collect::<Vec<_>>().join("\n"));
-    let calibrate = ["calibrate", "trace.csv", "-o", "sensor.toml", "--estimator", "ekf", "--branches", "1"];
-    let closing = bench.run(&calibrate).ok();
-    assert!(closing.contains("Temperature") && closing.contains("converted to 25"), "{closing}");
-    bench
+    static FILES: OnceLock<Vec<(String, String)>> = OnceLock::new();
+    Bench::with(FILES.get_or_init(|| {
+        let bench = Bench::new();
+        let simulate =
+            "simulate --protocol mixed --duration-s 1200 --sample-rate-hz 2 --speed-mm-s 5 --material representative";
+        let words: Vec<&str> = simulate.split(' ').collect();
+        bench.run(&[&words[..], &["--chamber", "period_s=400 rest_per_k=0.004", "-o", "trace.csv"]].concat()).ok();
+        let blind = |line: &str| match line.rsplit_once(',') {
+            Some((left, _)) if !line.starts_with('#') => left.to_owned(),
+            _ => line.to_owned(),
+        };
+        bench.write("blind.csv", bench.read("trace.csv").lines().map(blind).collect::<Vec<_>>().join("\n"));
+        let calibrate = ["calibrate", "trace.csv", "-o", "sensor.toml", "--estimator", "ekf", "--branches", "1"];
+        let closing = bench.run(&calibrate).ok();
+        assert!(closing.contains("Temperature") && closing.contains("converted to 25"), "{closing}");
+        bench.contents()
+    }))
 }
 
 fn coefficient(bench: &Bench, name: &str) -> f64 {

@@ -1,12 +1,10 @@
 //! Warnings about a sensor file used outside its calibrated range.
 
-use crate::common::{Bench, CALIBRATED_UNTIL, Csv, SIMULATE, change_rows};
+use crate::common::{Bench, CALIBRATED_UNTIL, Csv, change_rows};
 
 /// Returns a folder with `trace.csv` and a sensor calibrated on its first rows, `seen.csv`.
 fn calibrated() -> Bench {
-    let bench = Bench::new();
-    bench.run(&[&SIMULATE[..], &["-o", "trace.csv"]].concat()).ok();
-    bench.run(&["calibrate", "trace.csv", "--until", CALIBRATED_UNTIL, "--estimator", "ekf", "-o", "sensor.toml"]).ok();
+    let bench = Bench::calibrated();
     let until: f64 = CALIBRATED_UNTIL.parse().unwrap();
     let is_seen = |line: &&str| {
         let time_s = line.split(',').next().unwrap().parse::<f64>();

@@ -33,38 +33,24 @@ impl Bench {
         Self { folder: TempDir::new().unwrap() }
     }
 
-    /// Creates a folder with `trace.csv`, a simulated recording, and `sensor.toml`, calibrated on three quarters of it for the
-    /// fastest estimator.
-    pub fn calibrated() -> Self {
-        static FILES: OnceLock<(String, String)> = OnceLock::new();
-        let (trace, sensor) = FILES.get_or_init(|| {
-            let bench = Self::new();
-            bench.run(&[&SIMULATE[..], &["-o", "trace.csv"]].concat()).ok();
-            let calibrate = ["calibrate", "trace.csv", "--until", CALIBRATED_UNTIL, "-o", "sensor.toml"];
-            bench.run(&[&calibrate[..], &["--estimator", "ekf"]].concat()).ok();
-            (bench.read("trace.csv"), bench.read("sensor.toml"))
-        });
+    /// Creates a folder with these files.
+    pub fn with(files: &[(String, String)]) -> Self {
         let bench = Self::new();
-        bench.write("trace.csv", trace);
-        bench.write("sensor.toml", sensor);
+        files.iter().for_each(|(name, content)| bench.write(name, content));
         bench
     }
 
-    /// Creates the same with the default estimator, and `closing.json`, the summary of its calibration; it takes half a minute,
-    /// once.
+    /// Creates a folder with `trace.csv`, a simulated recording, `sensor.toml`, calibrated on three quarters of it for the
+    /// fastest estimator, and `closing.json`, the summary of its calibration.
+    pub fn calibrated() -> Self {
+        static FILES: OnceLock<Vec<(String, String)>> = OnceLock::new();
+        Self::with(FILES.get_or_init(|| calibrated(&["--estimator", "ekf"])))
+    }
+
+    /// Creates the same with the default estimator; it takes half a minute, once.
     pub fn calibrated_by_default() -> Self {
-        static FILES: OnceLock<[String; 3]> = OnceLock::new();
-        let names = ["trace.csv", "sensor.toml", "closing.json"];
-        let contents = FILES.get_or_init(|| {
-            let bench = Self::new();
-            bench.run(&[&SIMULATE[..], &["-o", "trace.csv"]].concat()).ok();
-            let calibrate = ["calibrate", "trace.csv", "--until", CALIBRATED_UNTIL, "-o", "sensor.toml", "--json"];
-            bench.write("closing.json", bench.run(&calibrate).ok());
-            names.map(|name| bench.read(name))
-        });
-        let bench = Self::new();
-        names.iter().zip(contents).for_each(|(name, content)| bench.write(name, content));
-        bench
+        static FILES: OnceLock<Vec<(String, String)>> = OnceLock::new();
+        Self::with(FILES.get_or_init(|| calibrated(&[])))
     }
 
     /// Returns the path of a file of the folder.
@@ -87,6 +73,11 @@ impl Bench {
         files_in(self.folder.path())
     }
 
+    /// Returns the names and contents of all files, which are text, sorted by name.
+    pub fn contents(&self) -> Vec<(String, String)> {
+        self.files().into_iter().map(|name| (name.clone(), self.read(&name))).collect()
+    }
+
     /// Runs the program to its end, with nothing on stdin.
     pub fn run(&self, arguments: &[&str]) -> Run {
         self.feed(arguments, "")
@@ -98,6 +89,15 @@ impl Bench {
             cargo_bin_cmd!("ohmstrain").current_dir(self.folder.path()).args(arguments).write_stdin(stdin).output();
         Run::new(arguments, output.unwrap())
     }
+}
+
+/// Returns a simulated recording, the sensor calibrated on its first rows with these flags, and the summary of the calibration.
+fn calibrated(flags: &[&str]) -> Vec<(String, String)> {
+    let bench = Bench::new();
+    bench.run(&[&SIMULATE[..], &["-o", "trace.csv"]].concat()).ok();
+    let calibrate = ["calibrate", "trace.csv", "--until", CALIBRATED_UNTIL, "-o", "sensor.toml", "--json"];
+    bench.write("closing.json", bench.run(&[&calibrate[..], flags].concat()).ok());
+    bench.contents()
 }
 
 /// Returns the names of the files in a folder, sorted.
@@ -199,6 +199,25 @@ impl Csv {
     pub fn numbers(&self, column: &str) -> Vec<f64> {
         self.cells(column).iter().map(|cell| cell.parse().unwrap()).collect()
     }
+}
+
+/// Asserts that a page is self-contained: nothing in it makes a browser load anything.
+#[track_caller]
+pub fn assert_one_whole_page(page: &str) {
+    assert!(page.starts_with("<!DOCTYPE html>") && page.trim_end().ends_with("</html>"));
+    assert!(page.matches("<svg").count() >= 5);
+    // The name of a namespace, which is not loaded, and targets within the page.
+    let page = page.replace("http://www.w3.org/2000/svg", "").replace("url(#", "");
+    for reference in ["http:", "https:", "src=", "href=\"/", "url(", "@import", "<script ", "<link", "<iframe"] {
+        assert!(!page.contains(reference), "{reference}");
+    }
+    assert_eq!(page.matches("<script>").count(), 1, "the page's own script, and no other");
+}
+
+/// Returns the first rows of a recording, with its header and what is above that.
+pub fn first_rows(trace: &str, rows: usize) -> String {
+    let above = trace.lines().position(|line| line.starts_with(|first: char| first.is_ascii_digit())).unwrap();
+    trace.lines().take(above + rows).map(|line| format!("{line}\n")).collect()
 }
 
 /// Returns a recording with some rows changed: `change` receives a row's index, from 0, and its cells.
