@@ -1,17 +1,11 @@
-/* Counts the instructions of a step over the exported vectors under `qemu -icount shift=0`: one nanosecond each, and the
- * board's SysTick has 25 MHz, so that one tick is 40 instructions. What a step takes of the stack is how much of a pattern
- * below it is gone.
- */
+/* Counts the instructions of a step over the exported vectors, and what a step takes of the stack: see counting.h. */
 #include <stdint.h>
 #include <stdio.h>
 
 #include "vectors.h"
 
-#define SYST_CSR (*(volatile uint32_t *)0xE000E010)
-#define SYST_RVR (*(volatile uint32_t *)0xE000E014)
-#define SYST_CVR (*(volatile uint32_t *)0xE000E018)
-
-static uint32_t since(uint32_t start) { return ((start - SYST_CVR) & 0x00FFFFFFu) * 40u; }
+#define PAINTED 2048
+#include "counting.h"
 
 /* Over all vectors; with the estimate, if asked for. Counted step by step: all of them would be too many for the timer where
  * floating point is software. */
@@ -36,39 +30,21 @@ static uint32_t steps(int asks)
     return all / VECTORS;
 }
 
-enum { PAINTED = 2048 };
-static const uint32_t PATTERN = 0x5EA50DE5u;
-
-/* The stack below the caller's, of which a few words are this function's own. */
-static __attribute__((noinline)) volatile uint32_t *below(void)
-{
-    uintptr_t stack_pointer;
-    __asm__ volatile("mov %0, sp" : "=r"(stack_pointer));
-    return (volatile uint32_t *)stack_pointer - PAINTED;
-}
-
 int main(void)
 {
     static ohmstrain_state state;
     uint32_t alone, with_estimate;
     volatile uint32_t *bottom;
-    int i;
-    SYST_RVR = 0x00FFFFFFu;
-    SYST_CVR = 0;
-    SYST_CSR = 5;
+    begin_timer();
     alone = steps(0);
     with_estimate = steps(1);
     ohmstrain_start(&state);
     ohmstrain_step(&state, state.rest_reading, 0.0f, 0);
     ohmstrain_step(&state, state.rest_reading * 1.01f, 0.0f, 0);
     bottom = below();
-    for (i = 0; i < PAINTED; i++) {
-        bottom[i] = PATTERN;
-    }
+    paint(bottom);
     ohmstrain_step(&state, state.rest_reading * 1.02f, 0.0f, 0);
-    for (i = 0; i < PAINTED && bottom[i] == PATTERN; i++) {
-    }
     printf("instructions a step: %lu, with its estimate %lu; state %u B, stack %u B\n", (unsigned long)alone,
-           (unsigned long)with_estimate, (unsigned)sizeof(ohmstrain_state), 4u * (unsigned)(PAINTED - i));
+           (unsigned long)with_estimate, (unsigned)sizeof(ohmstrain_state), 4u * unpainted(bottom));
     return 0;
 }

@@ -4,8 +4,6 @@ use rand_chacha::ChaCha12Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::Linear;
-
 /// Random numbers that are the same on every machine.
 pub struct Draws(ChaCha12Rng);
 
@@ -40,18 +38,6 @@ impl Draws {
     pub fn covariance<const N: usize>(&mut self) -> SMatrix<f64, N, N> {
         let root = self.matrix::<N>();
         root * root.transpose() + SMatrix::identity() * 0.1
-    }
-
-    /// Draws a stable model with a full Q that is not small.
-    pub fn linear_model<const N: usize>(&mut self) -> Linear<f64, N> {
-        let raw = self.matrix::<N>();
-        let noise = self.covariance();
-        Linear { transition: raw * (0.9 / raw.norm()), noise, gradient: self.vector(), variance: 0.3 }
-    }
-
-    /// Draws readings of the size of that model's, every fourth one missing.
-    pub fn readings(&mut self, count: usize) -> Vec<Option<f64>> {
-        (0..count).map(|k| (k % 4 != 2).then(|| 2.0 * self.normal())).collect()
     }
 }
 

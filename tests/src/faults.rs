@@ -196,7 +196,8 @@ pub fn answer(
     let lasts_s = episode.until_s - episode.from_s;
     for (k, &from_s) in onsets_s.iter().enumerate() {
         let until_s = from_s + lasts_s;
-        let part = trace.since(from_s - BEFORE_S).until(until_s + AFTER_S);
+        let row_at = |time_s: f64| trace.time_s.partition_point(|earlier_s| *earlier_s < time_s);
+        let part = trace.rows(row_at(from_s - BEFORE_S)..row_at(until_s + AFTER_S));
         let episode = Episode { from_s, until_s, seed: episode.seed + k as u64, ..episode };
         let faulty = run(&episode.put_into(&part));
         let clean = run(&part);

@@ -15,7 +15,6 @@ mod mixture_smoother;
 mod mixtures;
 mod modules;
 mod naive_mixtures;
-mod one_kalman_filter;
 mod particle_oracles;
 mod particles;
 mod phase_calibration;

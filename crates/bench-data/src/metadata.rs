@@ -116,6 +116,12 @@ impl Metadata {
         }
     }
 
+    /// Sets `made_by`: the program that made the recording, in place of any other.
+    pub fn set_made_by(&mut self, made_by: &str) {
+        self.other.retain(|(key, _)| key != "made_by");
+        self.other.push(("made_by".into(), made_by.into()));
+    }
+
     /// Takes the values that `overrides` has, and keeps the others.
     pub fn override_with(&mut self, overrides: &Self) {
         fn take<T: Clone>(mine: &mut Option<T>, theirs: &Option<T>) {

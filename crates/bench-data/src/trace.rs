@@ -137,18 +137,6 @@ impl Trace {
         self.time_s.is_empty()
     }
 
-    /// Returns the rows with `time_s < end_s`.
-    #[must_use]
-    pub fn until(&self, end_s: f64) -> Self {
-        self.rows(0..self.time_s.partition_point(|time| *time < end_s))
-    }
-
-    /// Returns the rows with `time_s >= start_s`.
-    #[must_use]
-    pub fn since(&self, start_s: f64) -> Self {
-        self.rows(self.time_s.partition_point(|time| *time < start_s)..self.len())
-    }
-
     /// Returns some of the rows; rows beyond the last one are ignored.
     #[must_use]
     pub fn rows(&self, range: Range<usize>) -> Self {

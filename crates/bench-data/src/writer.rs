@@ -26,6 +26,17 @@ impl Trace {
         rows.flush()
     }
 
+    /// Returns the recording as [`Trace::write`] writes it, marked with the program that made it.
+    ///
+    /// # Errors
+    /// If a number cannot be written.
+    pub fn marked(mut self, made_by: &str) -> io::Result<Vec<u8>> {
+        self.metadata.set_made_by(made_by);
+        let mut bytes = Vec::new();
+        self.write(&mut bytes)?;
+        Ok(bytes)
+    }
+
     fn header(&self) -> Vec<Column> {
         let reading = match (&self.readings.converter, self.readings.kind) {
             (Some(_), _) => Column::Adc,

@@ -173,13 +173,13 @@ fn overrides_take_the_place_of_the_files_metadata() {
 }
 
 #[test]
-fn slices_by_time_and_by_row() {
+fn slices_by_row() {
     let trace = read("time_s,resistance_ohm,strain\n0,1,0\n1,2,0.1\n2,3,0.2\n3,4,0.3\n").unwrap();
-    assert_eq!(trace.until(2.0).time_s, [0.0, 1.0]);
-    assert_eq!(trace.since(2.0).readings.values, [3.0, 4.0]);
-    assert_eq!(trace.since(0.5).until(2.5).reference.unwrap().values, [0.1, 0.2]);
+    assert_eq!(trace.rows(0..2).time_s, [0.0, 1.0]);
+    assert_eq!(trace.rows(2..4).readings.values, [3.0, 4.0]);
+    assert_eq!(trace.rows(1..3).reference.unwrap().values, [0.1, 0.2]);
     assert_eq!(trace.rows(1..99).len(), 3);
-    assert!(trace.rows(7..9).is_empty() && trace.until(f64::NEG_INFINITY).is_empty());
+    assert!(trace.rows(7..9).is_empty() && trace.rows(0..0).is_empty());
 }
 
 #[test]

@@ -1,24 +1,22 @@
 //! Minimum requirements for recordings of a calibration.
 
+use crate::order::range;
 use crate::samples::FEWEST_ROWS;
 use crate::{CalibrationError, Samples};
 
 /// Checks the requirements of a calibration and returns the strain's range over all recordings.
 pub(crate) fn check(recordings: &[Samples]) -> Result<(f64, f64), CalibrationError> {
-    let mut range: Option<(f64, f64)> = None;
     for (recording, samples) in recordings.iter().enumerate() {
         let complete = samples.complete_rows().count();
         if complete < FEWEST_ROWS {
             return Err(CalibrationError::TooFewRows { recording, complete, needed: FEWEST_ROWS });
         }
-        let Some((low, high)) = samples.strain_range() else { continue };
-        range = Some(range.map_or((low, high), |(l, h)| (l.min(low), h.max(high))));
     }
-    match range {
+    match range(recordings.iter().filter_map(Samples::strain_range).flat_map(<[f64; 2]>::from)) {
         None => Err(CalibrationError::NoRecording),
         Some((low, high)) if !(high > low) => Err(CalibrationError::ConstantStrain),
         Some(_) if recordings.iter().all(is_frozen) => Err(CalibrationError::ConstantReading),
-        Some(range) => Ok(range),
+        Some(ends) => Ok(ends),
     }
 }
 

@@ -1,4 +1,4 @@
-use crate::order::sorted;
+use crate::order::{self, sorted};
 use crate::samples::central_rate;
 use crate::samples::{Samples, filled_strain};
 
@@ -141,11 +141,11 @@ fn correlation_time(time_s: &[f64], x: &[f64]) -> f64 {
 }
 
 fn mean(x: &[f64]) -> f64 {
-    x.iter().sum::<f64>() / x.len() as f64
+    order::mean(x.iter().copied())
 }
 
 pub(crate) fn root_mean_square(x: &[f64]) -> f64 {
-    (x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64).sqrt()
+    order::mean(x.iter().map(|x| x * x)).sqrt()
 }
 
 pub(crate) fn moving_mean(x: &[f64]) -> Vec<f64> {

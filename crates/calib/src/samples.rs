@@ -1,6 +1,6 @@
 use thiserror::Error;
 
-use crate::order::extent;
+use crate::order::{extent, range};
 
 /// One recording: times, readings and, where it is known, the true strain.
 ///
@@ -192,8 +192,7 @@ impl<'a> Samples<'a> {
     /// Returns the smallest and the largest known strain; `None` if no strain is known.
     #[must_use]
     pub fn strain_range(&self) -> Option<(f64, f64)> {
-        let known = self.strain.iter().copied().filter(|x| x.is_finite());
-        known.fold(None, |range, x| Some(range.map_or((x, x), |(low, high): (f64, f64)| (low.min(x), high.max(x)))))
+        range(self.strain.iter().copied().filter(|x| x.is_finite()))
     }
 }
 

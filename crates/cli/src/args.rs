@@ -24,7 +24,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 
 pub use batch::{BatchArgs, BatchCommand, SummaryForm};
 pub use calibrate::{CalibrateArgs, ReportArgs};
-pub use choice::{Auto, Branches, Coefficients, Estimator, Gauge};
+pub use choice::{Auto, Branches, Coefficients};
 pub use estimate::{EstimateArgs, FilterArgs, Format, RestResistance, SmoothArgs, Without, WrittenArgs};
 pub use evaluate::{Estimators, EvaluateArgs};
 pub use export::ExportArgs;

@@ -11,6 +11,8 @@ use crate::whole_file;
 
 /// Columns of readings in a recording of one channel.
 pub const ONE_CHANNEL: [&str; 3] = ["resistance_ohm", "resistance_ratio", "adc"];
+/// Columns of a recording that every channel keeps.
+pub const KEPT: [&str; 3] = ["time_s", "time_us", "temperature_c"];
 /// Endings of columns of readings, each with its column in a recording of one channel.
 const READINGS: [(&str, &str); 3] = [("_ohm", "resistance_ohm"), ("_ratio", "resistance_ratio"), ("_adc", "adc")];
 /// Endings of columns of references, each with its column in a recording of one channel.
@@ -95,22 +97,12 @@ impl Table {
         let known = reference(&channel.reference).map_or("_", |(_, known)| known);
         let sd = deviation(&channel.reference);
         let known_sd = deviation(known).unwrap_or_default();
-        let name = |column: &String| -> String {
-            let kept = ["time_s", "time_us", "temperature_c"].contains(&column.as_str());
-            let name = if *column == channel.column {
-                own
-            } else if *column == channel.reference {
-                known
-            } else if Some(column) == sd.as_ref() {
-                known_sd.as_str()
-            } else if kept {
-                column
-            } else {
-                "_"
-            };
-            name.to_owned()
-        };
-        let header = self.columns.iter().map(name).collect::<Vec<_>>().join(",");
+        let header = masked(self.columns.iter().map(String::as_str), |_, name| match name {
+            name if name == channel.column => Some(own),
+            name if name == channel.reference => Some(known),
+            name if Some(name) == sd.as_deref() => Some(known_sd.as_str()),
+            name => KEPT.contains(&name).then_some(name),
+        });
         let bytes = [&self.bytes[..self.header.0], header.as_bytes(), &self.bytes[self.header.1..]].concat();
         // Messages name the column of this file, not the one that stands for it in a recording of one channel.
         let named = |text: String| {
@@ -129,6 +121,12 @@ impl Table {
         let line = 1 + self.bytes[..self.header.0].iter().filter(|byte| **byte == b'\n').count();
         format!("{}:{line}", self.path.display())
     }
+}
+
+/// Returns a header for one channel: columns have the names that `known` makes of place and name; those without one are ignored.
+pub fn masked<'c>(columns: impl Iterator<Item = &'c str>, known: impl Fn(usize, &'c str) -> Option<&'c str>) -> String {
+    let names = columns.enumerate().map(|(place, name)| known(place, name).unwrap_or("_"));
+    names.collect::<Vec<_>>().join(",")
 }
 
 /// Returns the name of a column of readings without its unit, and its column in a recording of one channel.

@@ -7,6 +7,7 @@
 mod alignment;
 mod args;
 mod channels;
+mod chart;
 mod commands;
 mod error;
 mod estimates;
@@ -25,6 +26,7 @@ mod protocol_file;
 mod readings;
 mod renamed;
 mod run;
+mod screen;
 mod sensor_file;
 mod stream;
 mod suits;

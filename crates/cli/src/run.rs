@@ -15,7 +15,7 @@ pub fn builder<'a>(sensor: &'a Sensor, args: &'a EstimateArgs) -> FilterBuilder<
 pub fn builder_anew<'a>(sensor: &'a Sensor, args: &'a EstimateArgs) -> FilterBuilder<'a> {
     let mut builder = sensor.filter();
     if let Some(kind) = args.estimator.chosen() {
-        builder = builder.estimator(kind.0);
+        builder = builder.estimator(kind);
     }
     if args.is_without(Without::Correction) {
         builder = builder.without_correction();
@@ -33,7 +33,7 @@ pub fn builder_anew<'a>(sensor: &'a Sensor, args: &'a EstimateArgs) -> FilterBui
         builder = builder.without_doubts();
     }
     if let Some(influence) = args.influence {
-        builder = builder.influence(influence.0);
+        builder = builder.influence(influence);
     }
     builder
 }

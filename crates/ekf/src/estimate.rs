@@ -1,5 +1,6 @@
 use ohmstrain_model::{MOTION_STATES, ModelNoise, Phase, Scalar, StrainRange, SwitchedModel};
 
+use crate::live::reported;
 use crate::{Belief, Gaussian, Real, State};
 
 /// Estimate reported to the user: strain, rate and the rest, with standard deviations.
@@ -84,8 +85,8 @@ impl<T: Real> Estimate<T> {
     ) -> Self {
         let belief = &state.moments();
         let strain_of = |belief: &Belief<T, N, L>| {
-            let variance = belief.covariance[(0, 0)].max(T::zero()) * strain_sd_scale * strain_sd_scale;
-            Gaussian { mean: belief.mean[0], variance }.clamped(limits)
+            let strain = Gaussian { mean: belief.mean[0], variance: belief.covariance[(0, 0)] };
+            reported(strain, strain_sd_scale, limits)
         };
         let (strain, rate) = (strain_of(belief), Gaussian::marginal(belief, 1));
         let border = model.law().static_border();

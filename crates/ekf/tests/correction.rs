@@ -2,8 +2,8 @@
 
 use ohmstrain_ekf::Gaussian;
 use ohmstrain_ekf::correction::{
-    BLOCK, Correction, FEATURES, FeatureScale, InputRows, InputScale, LowPass, OneSided, Process, ReadingFeatures,
-    RowBlock, Simulated, Triangle, block_of, consensus, mixture, settled, stripes,
+    BLOCK, Correction, FEATURES, FeatureScale, InputRows, InputScale, OneSided, Process, ReadingFeatures, RowBlock,
+    Simulated, Triangle, block_of, consensus, mixture, settled, stripes,
 };
 use ohmstrain_model::StrainRange;
 
@@ -301,25 +301,6 @@ fn a_member_that_contradicts_all_others_has_less_weight() {
     assert_eq!(consensus(near[0], near[1], [near[2], near[3]]), mixture(near));
     // Of two nobody knows which is wrong.
     assert_eq!(consensus(at(0.0, 1.0), at(10.0, 1.0), []), mixture([at(0.0, 1.0), at(10.0, 1.0)]));
-}
-
-/// A low-pass of a reading that goes straight from one known row to the next, against ten thousand small steps.
-#[test]
-fn low_passes_are_exact_however_long_the_step() {
-    let (readings, steps_s) = ([0.2, 0.9, -0.4, 0.1], [0.3, 5.0, 0.0]);
-    let mut low_pass = LowPass::new(2.0);
-    let mut exact: f64 = low_pass.next(0.0, readings[0]);
-    for (k, dt_s) in steps_s.into_iter().enumerate() {
-        let fine = 10_000;
-        for i in 0..fine {
-            let share = (i as f64 + 0.5) / f64::from(fine);
-            let reading = readings[k] + share * (readings[k + 1] - readings[k]);
-            let decay = (-dt_s / f64::from(fine) / 2.0).exp();
-            exact = decay * exact + (1.0 - decay) * reading;
-        }
-        // The midpoint rule leaves (dt/n)²/24 of a second derivative below one.
-        assert!((low_pass.next(dt_s, readings[k + 1]) - exact).abs() < 1e-7);
-    }
 }
 
 #[test]

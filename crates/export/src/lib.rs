@@ -157,17 +157,19 @@ const C: [Template; 21] = [
     ("README.md", include_str!("templates/readme_c.md")),
 ];
 
-/// Files that `ohmstrain.c` includes.
-const C_PARTS: [Template; 3] = [
+/// Files that other templates include: `cells.c` both replays, the others `ohmstrain.c`.
+const C_PARTS: [Template; 4] = [
     ("listed.c", include_str!("templates/listed.c")),
     ("hypotheses.c", include_str!("templates/hypotheses.c")),
     ("correction.c", include_str!("templates/correction.c")),
+    ("cells.c", include_str!("templates/cells.c")),
 ];
 
 const RUST: [Template; 2] =
     [("sensor.rs", include_str!("templates/sensor.rs")), ("README.md", include_str!("templates/readme_rust.md"))];
 
-/// Returns an environment whose variables stand between `<<` and `>>`: C contains many double braces.
+/// Returns an environment with the parts that templates include. Variables stand between `<<` and `>>`: C contains many double
+/// braces.
 fn environment() -> Result<Environment<'static>, ExportError> {
     let mut environment = Environment::new();
     let syntax = SyntaxConfig::builder()
@@ -177,6 +179,9 @@ fn environment() -> Result<Environment<'static>, ExportError> {
         .keep_trailing_newline(true)
         .build()?;
     environment.set_syntax(syntax);
+    for (name, part) in C_PARTS {
+        environment.add_template(name, part)?;
+    }
     Ok(environment)
 }
 
@@ -198,9 +203,6 @@ pub fn files(
         ExportTarget::Rust => &RUST,
     };
     let mut environment = environment()?;
-    for (name, part) in C_PARTS {
-        environment.add_template(name, part)?;
-    }
     let mut files = Vec::new();
     for (path, template) in templates {
         environment.add_template(path, template)?;

@@ -58,7 +58,7 @@ const ANOTHER_DAY: f32 = 1.08;
 
 /// Factor by which another filter may be further from exact arithmetic than Rust's `f32` filter is, or than other roundings of
 /// the readings move it.
-const FURTHER: f64 = 3.0;
+pub const FURTHER: f64 = 3.0;
 
 /// Seed of the noise, and the largest number of seeds that are tried.
 const FIRST_SEED: u64 = 1;
@@ -66,7 +66,7 @@ const SEEDS: u64 = 8;
 
 /// Number of runs with other roundings of the readings, and their relative deviation: larger than the differences between C
 /// libraries, so that a decision close to a tie is found.
-const ROUNDINGS: u64 = 6;
+pub const ROUNDINGS: u64 = 6;
 const ROUNDED_BY: f64 = 2.0 * f32::EPSILON as f64;
 
 /// Largest effect of rounding, as a share of the mean deviation; beyond it, rounding decides which hypotheses are merged.
@@ -102,13 +102,10 @@ impl Run {
         )?;
         let mut rounding = farthest(&estimates, exact.into_iter());
         // The distance from exact arithmetic can be small by chance.
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut rounded = other_rounding(seed);
         for _ in 0..ROUNDINGS {
-            let mut rounded = |reading: f32| {
-                let normal: f64 = StandardNormal.sample(&mut random);
-                (f64::from(reading) * (1.0 + ROUNDED_BY * normal)) as f32
-            };
-            let perturbed = inputs.iter().map(|input| Input { reading: input.reading.map(&mut rounded), ..*input });
+            let mut other = |reading: f32| rounded(reading.into());
+            let perturbed = inputs.iter().map(|input| Input { reading: input.reading.map(&mut other), ..*input });
             let (others, _) = single(&perturbed.collect::<Vec<_>>())?;
             let others = others.into_iter().map(|(strain, sd)| (f64::from(strain), f64::from(sd)));
             rounding = rounding.max(farthest(&estimates, others));
@@ -120,6 +117,15 @@ impl Run {
     fn is_calm(&self) -> bool {
         let sd = self.estimates.iter().map(|(_, sd)| f64::from(*sd)).sum::<f64>() / self.estimates.len() as f64;
         self.rounding < CALM * sd
+    }
+}
+
+/// Returns a function that rounds readings otherwise, each call with the next draw.
+pub fn other_rounding(seed: u64) -> impl FnMut(f64) -> f32 {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    move |reading: f64| {
+        let normal: f64 = StandardNormal.sample(&mut random);
+        (reading * (1.0 + ROUNDED_BY * normal)) as f32
     }
 }
 

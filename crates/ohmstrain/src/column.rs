@@ -219,7 +219,8 @@ impl Header {
 }
 
 /// Returns the name of the column of readings, the same in every file.
-pub(crate) const fn reading_column(unit: ReadingUnit) -> &'static str {
+#[must_use]
+pub const fn reading_column(unit: ReadingUnit) -> &'static str {
     match unit {
         ReadingUnit::Ohm => "resistance_ohm",
         ReadingUnit::Ratio => "resistance_ratio",

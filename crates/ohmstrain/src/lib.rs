@@ -38,6 +38,7 @@ mod estimate;
 mod explain;
 mod filter;
 mod fused;
+mod influence;
 mod known;
 mod known_doubt;
 #[cfg(feature = "calibrate")]
@@ -83,6 +84,7 @@ pub use filter::{Filter, LaggedFilter};
 #[cfg(feature = "calibrate")]
 pub use fused::{Fused, fuse};
 pub use fused::{FusedEstimate, FusedFilter, FusedSensor};
+pub use influence::influence;
 pub use known::Known;
 pub use known_doubt::{StartDoubt, UnusedKnown, unused_known};
 #[cfg(feature = "calibrate")]

@@ -11,7 +11,7 @@ use crate::about::About;
 use crate::doubts::{called, on_one_clock, raised_or_warned};
 use crate::error::{Place, Stopped, check_signals, of_library, raise};
 use crate::evaluation::{Scored, after_split};
-use crate::options::estimator;
+use crate::options::{estimator, wrong};
 use crate::recording::Recording;
 use crate::sensor::Sensor;
 
@@ -53,12 +53,8 @@ impl Choices {
             calibration = calibration.branches(branches);
         }
         let Some(wanted) = self.gauge.as_deref().filter(|wanted| *wanted != "auto") else { return Ok(calibration) };
-        let family = GaugeFamily::ALL.into_iter().find(|family| family.name() == wanted).ok_or_else(|| {
-            let text =
-                format!("gauge: expected auto, polynomial, decaying-exponential or tunnelling, found `{wanted}`");
-            raise(&Place::default(), &text)
-        })?;
-        Ok(calibration.gauge(family))
+        let family: Result<GaugeFamily, String> = wanted.parse();
+        Ok(calibration.gauge(family.map_err(|expected| wrong("gauge", expected, wanted))?))
     }
 }
 

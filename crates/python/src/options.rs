@@ -1,4 +1,4 @@
-use ohmstrain::{Column, EstimatorKind, FilterBuilder, Influence, Known, Sensor};
+use ohmstrain::{Column, EstimatorKind, FilterBuilder, Known, Sensor, influence};
 use pyo3::prelude::*;
 
 use crate::error::{Place, of_library, raise};
@@ -82,7 +82,7 @@ impl Options {
             builder = builder.gate(nis);
         }
         if let Some(text) = &self.influence {
-            builder = builder.influence(influence(text)?);
+            builder = builder.influence(influence(text).map_err(|expected| wrong("influence", expected, text))?);
         }
         Ok(builder)
     }
@@ -99,30 +99,10 @@ pub fn estimator(name: &str) -> PyResult<Option<EstimatorKind>> {
     if name == "auto" {
         return Ok(None);
     }
-    let found = EstimatorKind::ALL.into_iter().find(|kind| kind.name() == name);
-    found.map(Some).ok_or_else(|| {
-        let names = EstimatorKind::ALL.map(EstimatorKind::name).join(", ");
-        raise(&Place::default(), &format!("estimator: expected auto or {names}, found `{name}`"))
-    })
+    name.parse().map(Some).map_err(|expected| wrong("estimator", expected, name))
 }
 
-fn influence(text: &str) -> PyResult<Influence<f64>> {
-    if text == "none" {
-        return Ok(Influence::Full);
-    }
-    let parsed = text.split_once(':').and_then(|(kind, number)| {
-        let number: f64 = number.parse().ok().filter(|number: &f64| number.is_finite() && *number > 0.0)?;
-        match kind {
-            "huber" => Some(Influence::Huber { threshold: number }),
-            "redescending" => Some(Influence::Redescending { threshold: number }),
-            "student-t" => Some(Influence::StudentT { degrees_of_freedom: number }),
-            _ => None,
-        }
-    });
-    let message = || {
-        format!(
-            "influence: expected none, or redescending:K, huber:K or student-t:DOF with a positive number, found `{text}`"
-        )
-    };
-    parsed.ok_or_else(|| raise(&Place::default(), &message()))
+/// Creates the error of an option with another text than those expected.
+pub fn wrong(option: &str, expected: String, found: &str) -> PyErr {
+    raise(&Place::default(), &format!("{option}: {expected}, found `{found}`"))
 }

@@ -134,31 +134,8 @@ impl Sample {
 pub struct ScoreRow<'a> {
     /// Its name.
     pub name: &'a str,
-    /// Root mean squared error, in the quantity's unit.
-    pub rmse: f64,
-    /// Root mean squared error in percent of full scale.
-    pub rmse_percent_fs: f64,
-    /// Share of rows, 0 to 1, whose 95 % interval contains the reference; `None` for an estimator without intervals.
-    pub coverage_95: Option<f64>,
-    /// Mean width of those intervals in percent of full scale.
-    pub width_95_percent_fs: Option<f64>,
-    /// Mean continuous ranked probability score in percent of full scale.
-    pub crps_percent_fs: f64,
-}
-
-impl<'a> ScoreRow<'a> {
-    /// Selects the scores that a report shows.
-    #[must_use]
-    pub const fn new(name: &'a str, scores: &Scores) -> Self {
-        Self {
-            name,
-            rmse: scores.rmse,
-            rmse_percent_fs: scores.rmse_percent_fs,
-            coverage_95: scores.coverage_95,
-            width_95_percent_fs: scores.width_95_percent_fs,
-            crps_percent_fs: scores.crps_percent_fs,
-        }
-    }
+    /// Its scores.
+    pub scores: Scores,
 }
 
 /// Reason why there is no report.
@@ -231,7 +208,7 @@ impl<'a> Report<'a> {
             made_by: input.made_by,
             sample: input.sample,
             estimator: input.estimator.name(),
-            headline: summary::headline(input, &recording),
+            headline: summary::headline(&recording),
             verdict: input.verdict.clone(),
             summary: summary::extent_of(&recording),
             facts: input.facts,

@@ -1,12 +1,14 @@
 //! A recording with the data derived from it for the plots.
 
+use std::ops::Deref;
+
 use ohmstrain::Estimate;
 use ohmstrain_sensor::{Quantity, ReadingUnit, SensorParams};
 
+use super::ReportInput;
 use super::axis::extent;
 use super::law::{Driven, Law};
 use super::motion::{self, Hold, MotionKind};
-use super::{ReportInput, Scored};
 use ohmstrain::number::significant;
 
 /// Shortest hold whose relaxation is plotted, s.
@@ -18,22 +20,9 @@ const CURVE_POINTS: u32 = 200;
 
 /// The report's input and the data derived from it.
 pub struct PlottedRecording<'a> {
-    /// Times, s.
-    pub time_s: &'a [f64],
-    /// Readings; NaN where missing.
-    pub reading: &'a [f64],
-    /// Reference, if it is known anywhere.
+    input: ReportInput<'a>,
+    /// Reference, if it is known anywhere; hides that of the input.
     pub truth: Option<&'a [f64]>,
-    /// The filter's estimates.
-    pub filtered: &'a [Estimate],
-    /// The smoother's estimates.
-    pub smoothed: &'a [Estimate],
-    /// The sensor.
-    pub params: &'a SensorParams,
-    /// R₀.
-    pub rest_reading: f64,
-    /// The part that is scored.
-    pub scored: Scored,
     /// The sensor's law.
     pub law: Law<'a>,
     /// Motion of the strain, row by row.
@@ -43,6 +32,14 @@ pub struct PlottedRecording<'a> {
     strain: Vec<f64>,
     held: Vec<Hold>,
     held_driven: Driven,
+}
+
+impl<'a> Deref for PlottedRecording<'a> {
+    type Target = ReportInput<'a>;
+
+    fn deref(&self) -> &Self::Target {
+        &self.input
+    }
 }
 
 impl<'a> PlottedRecording<'a> {
@@ -66,14 +63,8 @@ impl<'a> PlottedRecording<'a> {
             (None, driven)
         };
         Self {
-            time_s: input.time_s,
-            reading: input.reading,
+            input: input.clone(),
             truth,
-            filtered: input.filtered,
-            smoothed: input.smoothed,
-            params: input.params,
-            rest_reading: input.rest_reading,
-            scored: input.scored,
             motions: motion::motions(input.time_s, &strain, &held),
             law,
             driven,

@@ -4,28 +4,29 @@ use ohmstrain_sensor::Quantity;
 
 use super::innovations::Innovations;
 use super::recording::PlottedRecording;
-use super::{ReportInput, ScoreRow, Scored, axis};
+use super::{Scored, axis};
+use ohmstrain::Scores;
 use ohmstrain::number::{percent, plain, significant};
 
 /// Returns the result in words.
-pub fn headline(input: &ReportInput, recording: &PlottedRecording) -> String {
-    match input.scores.first() {
-        Some(score) => scored(score, input),
+pub fn headline(recording: &PlottedRecording) -> String {
+    match recording.scores.first() {
+        Some(row) => scored(&row.scores, recording),
         None if recording.truth.is_some() => "Nothing was scored against the reference.".into(),
         None => "There is no reference, so errors are not known.".into(),
     }
 }
 
-fn scored(score: &ScoreRow, input: &ReportInput) -> String {
-    let what = match input.params.quantity {
+fn scored(scores: &Scores, recording: &PlottedRecording) -> String {
+    let what = match recording.params.quantity {
         Quantity::Strain => "Strain",
         Quantity::AngleDeg => "Angle",
     };
-    let own = match input.params.quantity {
-        Quantity::Strain => format!("{} % strain", significant(100.0 * score.rmse, 2)),
-        Quantity::AngleDeg => format!("{}°", significant(score.rmse, 2)),
+    let own = match recording.params.quantity {
+        Quantity::Strain => format!("{} % strain", significant(100.0 * scores.rmse, 2)),
+        Quantity::AngleDeg => format!("{}°", significant(scores.rmse, 2)),
     };
-    let part = match input.scored {
+    let part = match recording.scored {
         Scored { from_s: None, until_s: None } => String::new(),
         Scored { from_s: Some(from), until_s: None } => format!(", scored from {} s on", plain(from)),
         Scored { from_s: None, until_s: Some(until) } => format!(", scored until {} s", plain(until)),
@@ -33,11 +34,11 @@ fn scored(score: &ScoreRow, input: &ReportInput) -> String {
             format!(", scored from {} to {} s", plain(from), plain(until))
         }
     };
-    let coverage = score.coverage_95.map_or_else(String::new, |share| {
+    let coverage = scores.coverage_95.map_or_else(String::new, |share| {
         format!("; the 95 % interval holds the reference in {} of the rows", percent(share))
     });
-    let error = percent(score.rmse_percent_fs / 100.0);
-    format!("{what} to {error} of full scale RMS ({own}), {}{part}{coverage}.", input.sample.name())
+    let error = percent(scores.rmse_percent_fs / 100.0);
+    format!("{what} to {error} of full scale RMS ({own}), {}{part}{coverage}.", recording.sample.name())
 }
 
 /// Describes the length of the recording, and missing data.

@@ -57,13 +57,14 @@ pub fn scores(rows: &[ScoreRow], quantity: Quantity, sample: Sample) -> Table {
     };
     let cells = |row: &ScoreRow| {
         let share = |share: Option<f64>| share.map_or_else(|| "–".into(), percent);
+        let scores = &row.scores;
         [
             row.name.to_owned(),
-            plain(row.rmse),
-            percent(row.rmse_percent_fs / 100.0),
-            share(row.coverage_95),
-            share(row.width_95_percent_fs.map(|width| width / 100.0)),
-            percent(row.crps_percent_fs / 100.0),
+            plain(scores.rmse),
+            percent(scores.rmse_percent_fs / 100.0),
+            share(scores.coverage_95),
+            share(scores.width_95_percent_fs.map(|width| width / 100.0)),
+            percent(scores.crps_percent_fs / 100.0),
         ]
     };
     let caption = format!(

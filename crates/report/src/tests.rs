@@ -1,6 +1,6 @@
 use std::collections::BTreeMap;
 
-use ohmstrain::Estimate;
+use ohmstrain::{Estimate, Scores};
 use ohmstrain_sensor::{
     BranchParams, EstimatorKind, EstimatorParams, GaugeParams, LawParams, MotionParams, NoiseParams, Quantity,
     RangeParams, ReadingUnit, SensorParams, StaticCubic, Uncertainty, Unstated, Validity,
@@ -106,11 +106,22 @@ fn page(params: &SensorParams, time_s: &[f64], reading: &[f64], truth: Option<&[
         facts: &[("Seen", "a & b".into())],
         scores: &[ScoreRow {
             name: "<filter>",
-            rmse: 0.01,
-            rmse_percent_fs: 3.3,
-            coverage_95: None,
-            width_95_percent_fs: None,
-            crps_percent_fs: 2.5,
+            scores: Scores {
+                n: 100,
+                rmse: 0.01,
+                rmse_percent_fs: 3.3,
+                mae: 0.0075,
+                bias: 0.0,
+                coverage_50: None,
+                coverage_90: None,
+                coverage_95: None,
+                width_95: None,
+                width_95_percent_fs: None,
+                crps: 0.0075,
+                crps_percent_fs: 2.5,
+                log_score: None,
+                wrong_branch: 0.0,
+            },
         }],
     };
     let report = Report::new(&input).unwrap_or_else(|error| panic!("{error}"));

@@ -30,7 +30,7 @@ pub fn recipe(flags: &str) -> Result<Recipe, String> {
 /// Takes one flag and its value.
 fn say(recipe: &mut Recipe, flag: &str, value: &str) -> Result<(), String> {
     match flag {
-        "--column" => recipe.columns.push(of_role(value, |column| parsed(column))?),
+        "--column" => recipe.columns.push(of_role(value, parsed)?),
         "--unit" => recipe.units.push(of_role(value, |unit| Ok(unit.to_owned()))?),
         "--decimal" => recipe.decimal.push(parsed(value)?),
         "--skip" => recipe.skip.push(parsed(value)?),

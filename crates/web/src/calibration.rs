@@ -1,6 +1,6 @@
 //! Calibration as by `ohmstrain calibrate`, with progress.
 
-use js_sys::{Date, Function, JSON};
+use js_sys::{Date, Function};
 use ohmstrain::trace::{TraceFile, check_alike, first_distrusted_rows, known_recordings};
 use ohmstrain::{
     Calibration, Closing, EstimatorKind, GaugeFamily, Kept, LeftOutRow, Stage, Tested, calibration_doubts,
@@ -11,7 +11,7 @@ use serde::Deserialize;
 use wasm_bindgen::prelude::*;
 
 use crate::doubts::{on_one_clock, refuse_or_warn};
-use crate::json::{json, refused};
+use crate::json::{json, parsed, refused};
 use crate::recording::Recording;
 use crate::sensor::Sensor;
 
@@ -31,14 +31,6 @@ struct Choices {
 }
 
 impl Choices {
-    fn of(value: &JsValue) -> Result<Self, String> {
-        if value.is_undefined() || value.is_null() {
-            return Ok(Self::default());
-        }
-        let text = JSON::stringify(value).map_err(|_| "expected choices as an object")?;
-        serde_json::from_str(&String::from(text)).map_err(|error| error.to_string())
-    }
-
     fn calibration(&self) -> Result<Calibration<'static>, String> {
         let mut calibration = Calibration::new();
         if let Some(wanted) = self.estimator.as_deref().filter(|name| *name != "auto") {
@@ -51,19 +43,14 @@ impl Choices {
             calibration = calibration.branches(branches);
         }
         let Some(wanted) = self.gauge.as_deref().filter(|name| *name != "auto") else { return Ok(calibration) };
-        let family = GaugeFamily::ALL.into_iter().find(|family| family.name() == wanted).ok_or_else(|| {
-            format!("gauge: expected auto, polynomial, decaying-exponential or tunnelling, found `{wanted}`")
-        })?;
-        Ok(calibration.gauge(family))
+        let family: Result<GaugeFamily, String> = wanted.parse();
+        Ok(calibration.gauge(family.map_err(|expected| format!("gauge: {expected}, found `{wanted}`"))?))
     }
 }
 
 /// Returns an estimator by its name.
 pub fn estimator(name: &str) -> Result<EstimatorKind, String> {
-    EstimatorKind::ALL.into_iter().find(|kind| kind.name() == name).ok_or_else(|| {
-        let names = EstimatorKind::ALL.map(EstimatorKind::name).join(", ");
-        format!("estimator: expected auto or {names}, found `{name}`")
-    })
+    name.parse().map_err(|expected| format!("estimator: {expected}, found `{name}`"))
 }
 
 /// Result of a calibration.
@@ -88,7 +75,7 @@ pub fn calibrate(
     #[wasm_bindgen(unchecked_param_type = "Choices | undefined")] choices: JsValue,
     #[wasm_bindgen(unchecked_param_type = "((stage: string, share: number) => void) | undefined")] progress: JsValue,
 ) -> Result<Calibrated, JsError> {
-    let choices = Choices::of(&choices).map_err(refused)?;
+    let choices = parsed::<Choices>(&choices, "choices").map_err(refused)?;
     let progress = progress.dyn_into::<Function>().ok();
     run(recordings.into_iter().map(|recording| recording.file).collect(), &choices, progress.as_ref()).map_err(refused)
 }

@@ -11,9 +11,7 @@ use crate::recording::Recording;
 #[wasm_bindgen]
 pub fn example(seed: u32) -> Result<Recording, JsError> {
     let settings = SimulationSettings { seed: seed.into(), ..SimulationSettings::example() };
-    let mut trace = simulate(&settings).map_err(refused)?;
-    trace.metadata.other.push(("made_by".into(), format!("{MADE_BY} simulate")));
-    let mut bytes = Vec::new();
-    trace.write(&mut bytes).map_err(refused)?;
+    let trace = simulate(&settings).map_err(refused)?;
+    let bytes = trace.marked(&format!("{MADE_BY} simulate")).map_err(refused)?;
     Recording::of_trace("example.csv", bytes).map_err(refused)
 }

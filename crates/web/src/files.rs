@@ -73,12 +73,8 @@ impl Files {
     }
 
     /// Returns a trace in the form that `ohmstrain import` writes.
-    fn imported(&self, mut trace: Trace) -> Result<Recording, String> {
-        let other = &mut trace.metadata.other;
-        other.retain(|(key, _)| key != "made_by");
-        other.push(("made_by".into(), format!("{} import", ohmstrain::MADE_BY)));
-        let mut bytes = Vec::new();
-        trace.write(&mut bytes).map_err(|error| error.to_string())?;
+    fn imported(&self, trace: Trace) -> Result<Recording, String> {
+        let bytes = trace.marked(&format!("{} import", ohmstrain::MADE_BY)).map_err(|error| error.to_string())?;
         Recording::of_trace(self.trace_name(), bytes).map_err(|error| error.to_string())
     }
 

@@ -1,6 +1,5 @@
 //! A running filter: readings in, estimates out.
 
-use js_sys::JSON;
 use ohmstrain::Column;
 use serde::Deserialize;
 use wasm_bindgen::prelude::*;
@@ -16,17 +15,6 @@ pub struct Wishes {
     rest_resistance: Option<f64>,
     initial_strain: Option<f64>,
     gate: Option<f64>,
-}
-
-impl Wishes {
-    /// Parses the options from an object; undefined gives the defaults.
-    pub fn of(value: &JsValue) -> Result<Self, String> {
-        if value.is_undefined() || value.is_null() {
-            return Ok(Self::default());
-        }
-        let text = JSON::stringify(value).map_err(|_| "expected wishes as an object")?;
-        serde_json::from_str(&String::from(text)).map_err(|error| error.to_string())
-    }
 }
 
 /// A running filter.

@@ -66,7 +66,7 @@ pub fn drawn(
     let static_cubic = score(recording, |k| (cubics[k], None));
     let rows = [("filter", filter), ("smoother", of(&smoothed)), ("static cubic", static_cubic)];
     let scores: Vec<ScoreRow> =
-        rows.into_iter().filter_map(|(name, scores)| scores.map(|scores| ScoreRow::new(name, &scores))).collect();
+        rows.into_iter().filter_map(|(name, scores)| scores.map(|scores| ScoreRow { name, scores })).collect();
     let sample = Sample::of(&trace.time_s, &recording.sha256, params, Scored::default());
     let left_out = params.summary.as_ref().filter(|_| sample != Sample::Out).map(Known::from);
     let verdict = filter.map(|filter| {

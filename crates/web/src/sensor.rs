@@ -7,7 +7,7 @@ use wasm_bindgen::prelude::*;
 use crate::calibration::estimator;
 use crate::estimates::{self, Estimates};
 use crate::firmware::{self, Firmware};
-use crate::json::{json, refused};
+use crate::json::{json, parsed, refused};
 use crate::live::{Filter, Wishes};
 use crate::recording::Recording;
 use crate::report::{self, Drawn};
@@ -78,7 +78,7 @@ impl Sensor {
         &self,
         #[wasm_bindgen(unchecked_param_type = "Wishes | undefined")] wishes: JsValue,
     ) -> Result<Filter, JsError> {
-        Wishes::of(&wishes).and_then(|wishes| Filter::new(&self.sensor, &wishes)).map_err(refused)
+        parsed(&wishes, "wishes").and_then(|wishes: Wishes| Filter::new(&self.sensor, &wishes)).map_err(refused)
     }
 
     /// Creates a filter for the lines of a board; without `header`, the board sends one. See [`Stream`].

@@ -15,7 +15,7 @@ use crate::law::structure::LawFit;
 use crate::motion_stats::MotionStats;
 use crate::order::median;
 use crate::prior::{self, CorrectionPrior};
-use crate::samples::Samples;
+use crate::samples::{Samples, usual_step_s};
 use ohmstrain_sensor::correction::SMOOTHER_INPUTS;
 use ohmstrain_sensor::{
     CorrectionParams, CorrectionScale, EstimatorKind, FilterParts, RangeParams, TrainingRow, future_features, outputs,
@@ -55,8 +55,8 @@ pub(crate) fn fit_correction(
     let all = if of_make.is_some() { None } else { AllOf::several(&candidates, &of_recordings) };
     let most = if rows.is_empty() { ROWS } else { prior::ROWS };
     rows.extend(chosen(&candidates, &of_recordings, most).iter().map(rounded));
-    let steps_s = recordings.iter().flat_map(|of| of.time_s.windows(2).map(|pair| pair[1] - pair[0]));
-    let simulated = simulated_rows(fit, &MotionStats::new(recordings), &scale, median(steps_s).unwrap_or(0.0));
+    let step_s = usual_step_s(recordings.iter().map(|samples| samples.time_s));
+    let simulated = simulated_rows(fit, &MotionStats::new(recordings), &scale, step_s);
     Ok(learn((corrects, scale), rows, (all, reference_sd(recordings)), &simulated, limits))
 }
 

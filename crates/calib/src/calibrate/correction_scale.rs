@@ -4,6 +4,7 @@ use ohmstrain_ekf::Reading;
 use ohmstrain_ekf::correction::{FEATURES, FeatureScale, ReadingFeatures, TIME_CONSTANTS_S, settled};
 
 use crate::digits::digits;
+use crate::order::extent;
 use crate::samples::Samples;
 use ohmstrain_sensor::CorrectionScale;
 
@@ -14,7 +15,7 @@ const FORGOTTEN: f64 = 2.0;
 /// not vary.
 pub(crate) fn reading_scale(recordings: &[Samples], readings: &[Vec<Option<Reading<f64>>>]) -> Option<CorrectionScale> {
     let known = readings.iter().flatten().flatten().map(|reading| reading.value);
-    let (low, high) = known.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+    let (low, high) = extent(known);
     let (centre, half_range) = (digits(0.5 * (low + high)), digits(0.5 * (high - low)));
     if !(half_range > 0.0) {
         return None;

@@ -143,27 +143,7 @@ fn handicap(kind: EstimatorKind) -> f64 {
     if kind.has_phases() { 0.0 } else { LOCK_IN }
 }
 
-/// Calibrates law, noise and motion on recordings with known strain. Deterministic: same samples, same result, in any order of the
-/// recordings. Outliers, and rows far from the law, are left out ([`screen`]).
-///
-/// Estimators are tried with a law for each of `structures` and each strength of ridge. The pair with the best score on held-out blocks
-/// determines the law. Every estimator, and the extended Kalman filter in any case, is then fitted to that law; the one of `kinds` with the
-/// best score on every row of those blocks becomes the default. Near ties go to the one that keeps hypotheses. [`EstimatorKind::Corrected`]
-/// is the default if it is requested; it corrects the best of its candidates, and is learned last, from the same rows.
-///
-/// # Errors
-/// If the recordings are too short or vary too little to learn a law from, if the law explains nothing, or if `structures` or `kinds` is
-/// empty.
-pub fn calibrate(
-    recordings: &[Samples],
-    structures: &[LawOptions],
-    kinds: &[EstimatorKind],
-    progress: impl FnMut(Stage),
-) -> Result<Calibration, CalibrationError> {
-    calibrate_once(recordings, structures, kinds, None, progress)
-}
-
-/// Runs [`calibrate`], with or without a prior.
+/// Calibrates once, with or without a prior; see [`calibrate_with_prior`](with_prior::calibrate_with_prior).
 pub(crate) fn calibrate_once(
     recordings: &[Samples],
     structures: &[LawOptions],

@@ -1,6 +1,7 @@
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
 use crate::calibrate::left_out::REFERENCE_SD;
+use crate::order::{self, range};
 use ohmstrain_sensor::Scores;
 
 /// Error, as a fraction of full scale, and duration, s, beyond which the estimate is taken to follow another solution.
@@ -24,15 +25,9 @@ pub struct ScoredRow {
 pub fn score(rows: &[ScoredRow]) -> Option<Scores> {
     let rows: Vec<&ScoredRow> = rows.iter().filter(|row| row.truth.is_finite()).collect();
     let n = rows.len();
-    let count = n as f64;
-    let mean = |of: &dyn Fn(&ScoredRow) -> f64| rows.iter().map(|row| of(row)).sum::<f64>() / count;
-    let full_scale = rows
-        .iter()
-        .fold(None, |range, row| {
-            let (low, high) = range.unwrap_or((row.truth, row.truth));
-            Some((row.truth.min(low), row.truth.max(high)))
-        })
-        .map(|(low, high)| high - low)?;
+    let mean = |of: &dyn Fn(&ScoredRow) -> f64| order::mean(rows.iter().map(|row| of(row)));
+    let (low, high) = range(rows.iter().map(|row| row.truth))?;
+    let full_scale = high - low;
     let rmse = mean(&|row| (row.strain - row.truth).powi(2)).sqrt();
     let has_sd = rows.iter().all(|row| row.sd.is_some());
     let covered = |level: f64| has_sd.then(|| mean(&|row| f64::from(u8::from(row.is_covered(level)))));

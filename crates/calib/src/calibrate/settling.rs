@@ -3,6 +3,7 @@
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::calibrate::left_out::{Build, LeftOut, PredictedFall};
+use crate::order;
 use crate::recording::holds::{Hold, LEAST_HOLD_S, holds};
 use crate::samples::Samples;
 use crate::sd_scale::Z_95;
@@ -98,7 +99,7 @@ fn likeliest(falls: &[Fall], count: usize, horizon_s: f64) -> SettlingParams {
         .iter()
         .map(|fall| ((fall.read - share * fall.predicted).powi(2), (fall.predicted / usual).powi(2)))
         .collect();
-    let mean = |of: &dyn Fn(f64, f64) -> f64| errors.iter().map(|(e, s)| of(*e, *s)).sum::<f64>() / errors.len() as f64;
+    let mean = |of: &dyn Fn(f64, f64) -> f64| order::mean(errors.iter().map(|(e, s)| of(*e, *s)));
     let constant = |ratio: f64| mean(&|error, predicted| error / (1.0 + ratio * ratio * predicted));
     let cost = |ratio: &f64| constant(*ratio).ln() + mean(&|_, predicted| (ratio * ratio * predicted).ln_1p());
     let (steps, least, most) = RATIOS;

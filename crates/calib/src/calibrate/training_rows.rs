@@ -3,17 +3,15 @@ use std::ops::Range;
 use ohmstrain_ekf::correction::FEATURES;
 use ohmstrain_sensor::TrainingRow;
 
+use crate::order::mean_sd;
+
 /// Weight of the path length of the features, against time, in the choice of rows: long holds repeat the same row.
 const BY_WAY: f64 = 0.8;
 
 /// Chooses rows spread evenly over time and over the path length of the past features, in each recording by itself.
 pub(crate) fn chosen(candidates: &[TrainingRow], recordings: &[Range<usize>], most: usize) -> Vec<TrainingRow> {
-    let n = candidates.len();
-    let sd = |i: usize| {
-        let mean = candidates.iter().map(|row| row.past[i]).sum::<f64>() / n as f64;
-        (candidates.iter().map(|row| (row.past[i] - mean).powi(2)).sum::<f64>() / n as f64).sqrt()
-    };
-    let sds: [f64; FEATURES] = std::array::from_fn(|i| sd(i).max(f64::MIN_POSITIVE));
+    let sd = |i: usize| mean_sd(candidates.iter().map(|row| row.past[i])).1.max(f64::MIN_POSITIVE);
+    let sds: [f64; FEATURES] = std::array::from_fn(sd);
     let step = |pair: &[TrainingRow]| {
         let square: f64 = (0..FEATURES).map(|i| ((pair[1].past[i] - pair[0].past[i]) / sds[i]).powi(2)).sum();
         square.sqrt()

@@ -8,14 +8,23 @@ use ohmstrain_sensor::EstimatorKind;
 /// Duration of a recording, as a fraction of that of the other sensors' recordings, from which on it is also calibrated without them.
 const ALONE: f64 = 1.0 / 3.0;
 
-/// Runs [`calibrate`](crate::calibrate) for one more sensor of a known make. A prior determines the law's structure; `structures` applies
-/// only without one. Noise and motion start from the prior, and the filter that the others correct is the only candidate for a correction.
+/// Calibrates law, noise and motion on recordings with known strain. Deterministic: same samples, same result, in any order of the
+/// recordings. Outliers, and rows far from the law, are left out ([`screen`](crate::screen)).
+///
+/// Estimators are tried with a law for each of `structures` and each strength of ridge. The pair with the best score on held-out blocks
+/// determines the law. Every estimator, and the extended Kalman filter in any case, is then fitted to that law; the one of `kinds` with the
+/// best score on every row of those blocks becomes the default. Near ties go to the one that keeps hypotheses. [`EstimatorKind::Corrected`]
+/// is the default if it is requested; it corrects the best of its candidates, and is learned last, from the same rows.
+///
+/// A prior is for one more sensor of a known make. It determines the law's structure; `structures` applies only without one. Noise and
+/// motion start from the prior, and the filter that the others correct is the only candidate for a correction.
 ///
 /// A recording a third as long as those of the others may contain more information than the prior. It is also calibrated without the prior,
 /// and the calibration with the smaller error on held-out quarters is returned.
 ///
 /// # Errors
-/// As [`calibrate`](crate::calibrate).
+/// If the recordings are too short or vary too little to learn a law from, if the law explains nothing, or if `structures` or `kinds` is
+/// empty.
 pub fn calibrate_with_prior(
     recordings: &[Samples],
     structures: &[LawOptions],

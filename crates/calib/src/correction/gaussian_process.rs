@@ -1,4 +1,5 @@
 use crate::dense::{cholesky, lower_inverse, product};
+use crate::order::mean_sd;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use ohmstrain_ekf::correction::kernel;
 use ohmstrain_sensor::correction::relevance;
@@ -116,8 +117,8 @@ impl GaussianProcess {
     /// Conditions a process on rows, given kernels by [`TrainingSet::kernel`].
     pub(super) fn of_kernel(targets: &[f64], kernel: DMatrix<f64>, noise: &Noise) -> Option<Self> {
         let n = targets.len();
-        let centre = targets.iter().sum::<f64>() / n as f64;
-        let size = (targets.iter().map(|y| (y - centre).powi(2)).sum::<f64>() / n as f64).sqrt().max(f64::MIN_POSITIVE);
+        let (centre, sd) = mean_sd(targets.iter().copied());
+        let size = sd.max(f64::MIN_POSITIVE);
         let targets = DVector::from_iterator(n, targets.iter().map(|y| (y - centre) / size));
         let covariance = cholesky(&kernel + &noise.covariance)?;
         let weights = covariance.solve(&targets);

@@ -10,7 +10,7 @@ use super::criterion::Criterion;
 use super::examples::{AllRows, Examples};
 use super::gaussian_process::{BLOCKS, GaussianProcess, LeftOutRow, Settings, TrainingSet};
 use super::sparse::{Population, Sums};
-use crate::order::extent;
+use crate::order::{extent, mean_sd};
 use crate::sd_scale::{joint_scale_of, sd_scale_up_to};
 
 /// Least prior variance of the strain given the direct process, and of the filter's error given the residual process, in units of the
@@ -273,9 +273,7 @@ fn as_slices(rows: &[Vec<f64>]) -> Vec<&[f64]> {
 /// Returns mean, standard deviation and range of values. A constant input gets an infinite standard deviation, so that it has no effect
 /// even at values far from it.
 pub(super) fn scale(values: impl Iterator<Item = f64> + Clone) -> InputScale<f64> {
-    let n = values.clone().count() as f64;
-    let mean = values.clone().sum::<f64>() / n;
-    let sd = (values.clone().map(|x| (x - mean).powi(2)).sum::<f64>() / n).sqrt();
+    let (mean, sd) = mean_sd(values.clone());
     let (lower, upper) = extent(values);
     InputScale { mean, sd: if upper > lower { sd } else { f64::INFINITY }, lower, upper }
 }

@@ -6,6 +6,7 @@
 //! that do not occur on another day.
 
 use crate::dense::product;
+use crate::order::mean_sd;
 use std::ops::Range;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
@@ -67,9 +68,8 @@ struct Normal {
 impl Sums {
     pub(super) fn new(population: Population, lengths: &[f64]) -> Self {
         let Population { few, inputs, targets, recordings, step_s } = population;
-        let n = targets.len() as f64;
-        let centre = targets.iter().sum::<f64>() / n;
-        let size = (targets.iter().map(|y| (y - centre).powi(2)).sum::<f64>() / n).sqrt().max(f64::MIN_POSITIVE);
+        let (centre, sd) = mean_sd(targets.iter().copied());
+        let size = sd.max(f64::MIN_POSITIVE);
         let targets = DVector::from_iterator(targets.len(), targets.iter().map(|y| (y - centre) / size));
         let relevance: Vec<f64> = lengths.iter().map(|length| relevance(*length)).collect();
         let of_rows = |a: &[f64], b: &[f64]| {

@@ -14,6 +14,7 @@ use crate::CalibrationError;
 use crate::calibrate::findings::LeftOutRow;
 use crate::calibrate::scores::{ScoredRow, score_of_full_scale};
 use crate::motion_stats::MotionStats;
+use crate::order::extent;
 use crate::samples::Samples;
 use crate::sd_scale::sd_scale;
 use neighbours::Neighbours;
@@ -143,8 +144,8 @@ impl Check<'_> {
 
 /// Returns the range of the strain.
 fn limits(recordings: &[Samples]) -> Result<RangeParams, CalibrationError> {
-    let strains = || recordings.iter().flat_map(|samples| samples.strain).copied().filter(|strain| strain.is_finite());
-    let (lower, upper) = (strains().fold(f64::INFINITY, f64::min), strains().fold(f64::NEG_INFINITY, f64::max));
+    let strains = recordings.iter().flat_map(|samples| samples.strain).copied().filter(|strain| strain.is_finite());
+    let (lower, upper) = extent(strains);
     if lower < upper { Ok(RangeParams { lower, upper }) } else { Err(CalibrationError::NoCommonRows) }
 }
 

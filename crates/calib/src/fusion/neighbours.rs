@@ -2,7 +2,7 @@ use ohmstrain_sensor::fusion::{UNLIKE, distance};
 
 use super::readings::{Readings, ReadingsRow};
 use super::{BLOCKS, KEPT_ROWS};
-use crate::order::{median, sorted};
+use crate::order::{mean_sd, median, sorted};
 
 /// Number of iterations for the channels' typical differences, each with the distances of the one before.
 const ROUNDS: usize = 3;
@@ -50,9 +50,7 @@ impl Neighbours {
 
 /// Returns the standard deviation of a channel's ln R.
 fn spread(readings: &Readings, channel: usize) -> f64 {
-    let values = || readings.rows.iter().map(|row| row.seen.ln_r[channel]);
-    let mean = values().sum::<f64>() / readings.rows.len() as f64;
-    (values().map(|value| (value - mean).powi(2)).sum::<f64>() / readings.rows.len() as f64).sqrt().max(LEAST_SD)
+    mean_sd(readings.rows.iter().map(|row| row.seen.ln_r[channel])).1.max(LEAST_SD)
 }
 
 /// Returns the typical difference of a channel's ln R between a row and the row of other blocks that is nearest to it in the other

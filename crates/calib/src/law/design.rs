@@ -24,6 +24,11 @@ pub(crate) struct StrainScale {
 }
 
 impl StrainScale {
+    /// Returns the scale of the strains between two ends.
+    pub(crate) fn of(lower: f64, upper: f64) -> Self {
+        Self { centre: 0.5 * (lower + upper), span: upper - lower }
+    }
+
     pub(crate) fn scaled(&self, strain: f64) -> f64 {
         (strain - self.centre) / self.span
     }

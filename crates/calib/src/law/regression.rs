@@ -62,8 +62,7 @@ impl LawRegression {
     /// Makes a regression with rows of equal weight; see [`robust`](crate::law::robust_loss::robust).
     pub(crate) fn new(samples: &[Samples]) -> Result<Self, CalibrationError> {
         let (lower, upper) = check(samples)?;
-        let scale = StrainScale { centre: 0.5 * (lower + upper), span: upper - lower };
-        Ok(Self::scaled(samples, scale, RangeParams { lower, upper }))
+        Ok(Self::scaled(samples, StrainScale::of(lower, upper), RangeParams { lower, upper }))
     }
 
     /// Makes a regression on the strain scale of other sensors, for laws that hold at least in a given range.

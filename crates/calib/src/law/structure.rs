@@ -1,3 +1,5 @@
+use std::str::FromStr;
+
 use nalgebra::DVector;
 
 use crate::CalibrationError;
@@ -28,6 +30,16 @@ impl GaugeFamily {
             Self::DecayingExponential => "decaying-exponential",
             Self::Tunnelling => "tunnelling",
         }
+    }
+}
+
+/// Parses a name; the error also lists `auto`, which callers take for no choice.
+impl FromStr for GaugeFamily {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        let found = Self::ALL.into_iter().find(|family| family.name() == name);
+        found.ok_or_else(|| "expected auto, polynomial, decaying-exponential or tunnelling".into())
     }
 }
 

@@ -2,7 +2,7 @@ use nalgebra::DMatrix;
 
 use super::derivatives::derivatives;
 use super::log_likelihood::log_likelihood;
-use super::newton::{MOST_ITERATIONS, Objective, Optimum, covariance, maximise};
+use super::newton::{MOST_ITERATIONS, Optimum, covariance, maximise};
 use super::{Derivatives, ModelFamily, Parameter, ReadingSeries, ReadingsLikelihood};
 use crate::CalibrationError;
 
@@ -87,7 +87,18 @@ impl<F: ModelFamily<N, L>, const N: usize, const L: usize> Likelihood<'_, F, N, 
     /// As [`Self::log_likelihood`], or if a value is not positive or a derivative does not exist.
     pub fn derivatives(&self, values: &[f64]) -> Result<Derivatives, CalibrationError> {
         let ln: Vec<f64> = values.iter().map(|value| value.ln()).collect();
-        derivatives(self.family, &ln, self.recordings)
+        self.ln_derivatives(&ln)
+    }
+
+    /// Returns the log-likelihood as a function of the logarithms of the parameters; NaN where it does not exist.
+    pub(super) fn ln_value(&self, ln: &[f64]) -> f64 {
+        let values: Vec<f64> = ln.iter().map(|ln| ln.exp()).collect();
+        self.log_likelihood(&values).map_or(f64::NAN, |log_likelihood| log_likelihood.value)
+    }
+
+    /// Returns [`Self::derivatives`] as a function of the logarithms of the parameters.
+    pub(super) fn ln_derivatives(&self, ln: &[f64]) -> Result<Derivatives, CalibrationError> {
+        derivatives(self.family, ln, self.recordings)
     }
 
     /// Finds the parameters that maximise the likelihood of the readings.
@@ -149,16 +160,5 @@ impl<F: ModelFamily<N, L>, const N: usize, const L: usize> Likelihood<'_, F, N, 
             iterations: optimum.iterations,
             converged: optimum.converged,
         }
-    }
-}
-
-impl<F: ModelFamily<N, L>, const N: usize, const L: usize> Objective for Likelihood<'_, F, N, L> {
-    fn value(&self, at: &[f64]) -> f64 {
-        let values: Vec<f64> = at.iter().map(|ln| ln.exp()).collect();
-        self.log_likelihood(&values).map_or(f64::NAN, |log_likelihood| log_likelihood.value)
-    }
-
-    fn derivatives(&self, at: &[f64]) -> Result<Derivatives, CalibrationError> {
-        derivatives(self.family, at, self.recordings)
     }
 }

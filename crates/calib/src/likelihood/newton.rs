@@ -1,15 +1,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
-use super::Derivatives;
+use super::{Derivatives, Likelihood, ModelFamily};
 use crate::CalibrationError;
-
-/// Objective to be maximised, as a function of the logarithms of the parameters.
-pub(super) trait Objective {
-    /// Returns the value; a value that is not finite counts as impossible.
-    fn value(&self, at: &[f64]) -> f64;
-    /// Returns value, gradient and Hessian.
-    fn derivatives(&self, at: &[f64]) -> Result<Derivatives, CalibrationError>;
-}
 
 /// End point of the search.
 pub(super) struct Optimum {
@@ -34,15 +26,15 @@ const ROUNDING: f64 = 1e-11;
 /// Smallest curvature, as a fraction of the largest; smaller ones are raised to it.
 const FLATTEST: f64 = 1e-10;
 
-/// Maximises by Newton's method within bounds, with the exact Hessian.
+/// Maximises a likelihood in the logarithms of its parameters by Newton's method within bounds, with the exact Hessian.
 ///
 /// Negative curvatures change sign, steps are limited to a radius that grows and shrinks with success, and parameters
 /// held at a bound are left out of the step. The last steps are pure Newton steps that rely on the gradient alone.
 /// argmin's trust-region and Newton solvers support neither bounds nor a stopping rule, hence this implementation.
 ///
 /// Source: Bertsekas, *SIAM J. Control Optim.* 20 (1982) 221 for the bounds.
-pub(super) fn maximise(
-    objective: &impl Objective,
+pub(super) fn maximise<F: ModelFamily<N, L>, const N: usize, const L: usize>(
+    likelihood: &Likelihood<F, N, L>,
     start: &[f64],
     bounds: &[(f64, f64)],
     most_iterations: usize,
@@ -51,7 +43,7 @@ pub(super) fn maximise(
         point.iter().zip(bounds).map(|(x, (lower, upper))| x.max(*lower).min(*upper)).collect()
     };
     let mut point = inside(&DVector::from_column_slice(start));
-    let mut now = objective.derivatives(&point)?;
+    let mut now = likelihood.ln_derivatives(&point)?;
     let (mut radius, mut iterations) = (FIRST_RADIUS, 0);
     loop {
         let free = free(&point, &now.gradient, bounds);
@@ -67,12 +59,12 @@ pub(super) fn maximise(
         let length = step.direction.amax();
         let next = inside(&(DVector::from_column_slice(&point) + &step.direction * (radius / length).min(1.0)));
         let tiny = step.concave && step.decrement <= ROUNDING * (1.0 + value.abs());
-        if !tiny && !(objective.value(&next) > value) {
+        if !tiny && !(likelihood.ln_value(&next) > value) {
             radius = 0.25 * radius.min(length);
             continue;
         }
         radius = (2.0 * radius).min(LARGEST_RADIUS);
-        match objective.derivatives(&next) {
+        match likelihood.ln_derivatives(&next) {
             Ok(derivatives) => (point, now) = (next, derivatives),
             Err(_) => radius *= 0.1,
         }

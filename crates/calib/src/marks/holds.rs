@@ -1,6 +1,6 @@
 //! Holds around marks, detected from the speed of the readings.
 
-use crate::order::{extent, sorted};
+use crate::order::{self, extent, sorted};
 use crate::samples::{Samples, central_rate};
 
 /// Half-width of the window over which readings and their rates are averaged, s.
@@ -61,9 +61,6 @@ impl Stillness {
 /// Returns the mean over [`AVERAGED_S`] to each side.
 fn averaged(time_s: &[f64], values: &[f64]) -> Vec<f64> {
     let row = |t: f64| time_s.partition_point(|s| *s < t);
-    let mean = |t: &f64| {
-        let near = &values[row(t - AVERAGED_S)..row(t + AVERAGED_S).max(row(*t) + 1)];
-        near.iter().sum::<f64>() / near.len() as f64
-    };
+    let mean = |t: &f64| order::mean(values[row(t - AVERAGED_S)..row(t + AVERAGED_S).max(row(*t) + 1)].iter().copied());
     time_s.iter().map(mean).collect()
 }

@@ -139,8 +139,7 @@ impl<'a> Problem<'a> {
     }
 
     fn regression(&self, motion: &MarkedMotion, z: &DVector<f64>) -> Result<LawRegression, CalibrationError> {
-        let RangeParams { lower, upper } = self.range;
-        let scale = StrainScale { centre: 0.5 * (lower + upper), span: upper - lower };
+        let scale = StrainScale::of(self.range.lower, self.range.upper);
         self.with_samples(motion, z, |samples| LawRegression::on_scale(&[*samples], scale, self.range))
     }
 
@@ -151,11 +150,7 @@ impl<'a> Problem<'a> {
         motion: &MarkedMotion,
         z: &DVector<f64>,
     ) -> Result<DMatrix<f64>, CalibrationError> {
-        let RangeParams { lower, upper } = self.range;
-        let scale = StrainScale { centre: 0.5 * (lower + upper), span: upper - lower };
-        let regression =
-            self.with_samples(motion, z, |samples| LawRegression::on_scale(&[*samples], scale, self.range))?;
-        Ok(DMatrix::from_columns(&structure.design(&regression).columns))
+        Ok(DMatrix::from_columns(&structure.design(&self.regression(motion, z)?).columns))
     }
 
     /// Returns the mean squared misfit of each move by a law that was fitted without it.

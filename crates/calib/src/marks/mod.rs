@@ -16,6 +16,7 @@ use nalgebra::DVector;
 use crate::CalibrationError;
 use crate::calibrate::calibrate_once;
 use crate::law::fit::LawOptions;
+use crate::order::extent;
 use crate::samples::Samples;
 use ohmstrain_sensor::{EstimatorKind, RangeParams};
 
@@ -49,7 +50,7 @@ pub struct MarkedReference {
 /// # Errors
 /// [`CalibrationError::Unsupported`] if there are not as many lists as recordings, [`CalibrationError::Marks`] if marks contradict each
 /// other or lie outside of their recording, and as
-/// [`calibrate`](crate::calibrate()) if no law explains the motion.
+/// [`calibrate_with_prior`](crate::calibrate_with_prior) if no law explains the motion.
 pub fn marked_references(
     recordings: &[Samples],
     marks: &[Vec<Mark>],
@@ -65,8 +66,7 @@ pub fn marked_references(
         let in_recording = |source| CalibrationError::Marks { recording, source };
         ranges.push(mark::check(marks, samples.time_s).map_err(in_recording)?);
     }
-    let lower = ranges.iter().map(|range| range.0).fold(f64::INFINITY, f64::min);
-    let upper = ranges.iter().map(|range| range.1).fold(f64::NEG_INFINITY, f64::max);
+    let (lower, upper) = extent(ranges.into_iter().flat_map(<[f64; 2]>::from));
     let range = RangeParams { lower, upper };
     let motions = |shape: f64| -> Vec<MarkedMotion> {
         let of_one = |(samples, marks): (&Samples, &Vec<Mark>)| MarkedMotion::new(samples, marks, range.span(), shape);

@@ -35,7 +35,7 @@ pub struct LawPrior {
 
 impl LawPrior {
     fn scale(&self) -> StrainScale {
-        StrainScale { centre: 0.5 * (self.range.lower + self.range.upper), span: self.range.span() }
+        StrainScale::of(self.range.lower, self.range.upper)
     }
 
     /// Returns the most probable law of recordings, and those without each of their blocks.

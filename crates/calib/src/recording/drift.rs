@@ -1,5 +1,5 @@
 use crate::law::structure::LawFit;
-use crate::order::extent;
+use crate::order::{extent, mean};
 use crate::samples::Samples;
 
 /// Least drift from the first to the last quarter of a recording, as a fraction of the range of its readings.
@@ -22,11 +22,7 @@ fn is_drift(means: &[f64], range: f64) -> bool {
 /// Returns the mean of the known residuals in each quarter.
 fn quarter_means(residuals: &[f64]) -> Vec<f64> {
     let quarters = residuals.chunks(residuals.len().div_ceil(4).max(1));
-    let means = quarters.map(|quarter| {
-        let known: Vec<f64> = quarter.iter().copied().filter(|residual| residual.is_finite()).collect();
-        known.iter().sum::<f64>() / known.len() as f64
-    });
-    means.collect()
+    quarters.map(|quarter| mean(quarter.iter().copied().filter(|residual| residual.is_finite()))).collect()
 }
 
 #[cfg(test)]

@@ -1,8 +1,9 @@
 use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
+use ohmstrain::{EstimatorKind, GaugeFamily};
 
-use super::{Auto, Branches, Coefficients, Estimator, Gauge, ReplaceArgs, UnitArgs, finite};
+use super::{Auto, Branches, Coefficients, ReplaceArgs, UnitArgs, finite};
 
 /// Flags of `calibrate`.
 #[derive(Debug, ClapArgs)]
@@ -24,11 +25,11 @@ pub struct CalibrateArgs {
     pub branches: Auto<Branches>,
     /// Family of the gauge curve: auto (polynomial), polynomial, decaying-exponential or tunnelling
     #[arg(long, default_value = "auto")]
-    pub gauge: Auto<Gauge>,
+    pub gauge: Auto<GaugeFamily>,
     /// Estimator to calibrate and to make the default: auto (corrected: sign-split and what is learned about its error), corrected, ekf, ukf, imm, sign-split
     /// or hypotheses; ekf is calibrated in any case
     #[arg(long, default_value = "auto")]
-    pub estimator: Auto<Estimator>,
+    pub estimator: Auto<EstimatorKind>,
     /// Prior learned from other sensors of the make (`fleet fit`): a short motion is enough then
     #[arg(long, value_name = "prior.toml", conflicts_with_all = ["branches", "gauge"])]
     pub prior: Option<PathBuf>,

@@ -1,7 +1,6 @@
 use std::str::FromStr;
 
-use ohmstrain_calib::{GaugeFamily, TemperatureCoefficients};
-use ohmstrain_sensor::EstimatorKind;
+use ohmstrain_calib::TemperatureCoefficients;
 
 /// Largest relative change per kelvin.
 const LARGEST_PER_K: f64 = 0.1;
@@ -48,19 +47,6 @@ impl FromStr for Branches {
     }
 }
 
-/// A family of gauge curves.
-#[derive(Clone, Copy, Debug)]
-pub struct Gauge(pub GaugeFamily);
-
-impl FromStr for Gauge {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let found = GaugeFamily::ALL.into_iter().find(|family| family.name() == text);
-        found.map(Self).ok_or_else(|| "expected auto, polynomial, decaying-exponential or tunnelling".into())
-    }
-}
-
 /// Coefficients of temperature, A:SD or A:SD,B:SD.
 #[derive(Clone, Copy, Debug)]
 pub struct Coefficients(pub TemperatureCoefficients);
@@ -79,22 +65,5 @@ impl FromStr for Coefficients {
         both.map(|(rest_per_k, gain_per_k)| Self(TemperatureCoefficients { rest_per_k, gain_per_k })).ok_or_else(|| {
             format!("expected A:SD or A:SD,B:SD, changes per kelvin up to {LARGEST_PER_K} and their deviations, e.g. 0.003:0.0005")
         })
-    }
-}
-
-/// An estimator.
-#[derive(Clone, Copy, Debug)]
-pub struct Estimator(pub EstimatorKind);
-
-impl FromStr for Estimator {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let names: Vec<&str> = EstimatorKind::ALL.iter().map(|kind| kind.name()).collect();
-        EstimatorKind::ALL
-            .into_iter()
-            .find(|kind| kind.name() == text)
-            .map(Self)
-            .ok_or_else(|| format!("expected auto or {}", names.join(", ")))
     }
 }

@@ -2,10 +2,9 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::{Args as ClapArgs, ValueEnum};
-use ohmstrain::Known;
-use ohmstrain_ekf::Influence;
+use ohmstrain::{EstimatorKind, Influence, Known, influence};
 
-use super::{Auto, Estimator, ReplaceArgs, SetupArgs, UnitArgs, finite, positive};
+use super::{Auto, ReplaceArgs, SetupArgs, UnitArgs, finite, positive};
 
 /// Flags that `filter`, `smooth` and `live` share.
 #[derive(Debug, ClapArgs)]
@@ -16,7 +15,7 @@ pub struct EstimateArgs {
     /// Estimator: auto (the sensor file's choice), corrected, ekf, ukf, imm, sign-split or
     /// hypotheses
     #[arg(long, default_value = "auto")]
-    pub estimator: Auto<Estimator>,
+    pub estimator: Auto<EstimatorKind>,
     /// Strain (or angle) at the first row, if it is known; the body is at rest there
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = finite)]
     pub initial_strain: Option<f64>,
@@ -37,8 +36,8 @@ pub struct EstimateArgs {
     pub gate: Option<f64>,
     /// Influence of surprising readings: redescending:K, the less the farther beyond K standard deviations, huber:K,
     /// student-t:DOF, or none, as they are [default: redescending:3]
-    #[arg(long, value_name = "redescending:K|huber:K|student-t:DOF|none")]
-    pub influence: Option<BoundedInfluence>,
+    #[arg(long, value_name = "redescending:K|huber:K|student-t:DOF|none", value_parser = influence)]
+    pub influence: Option<Influence<f64>>,
     /// Parts to leave out, separated by commas, to compare; may be given several times
     #[arg(long, value_enum, value_name = "WHAT", value_delimiter = ',')]
     pub without: Vec<Without>,
@@ -157,30 +156,6 @@ pub struct SmoothArgs {
     /// Estimation
     #[command(flatten)]
     pub estimate: EstimateArgs,
-}
-
-/// Bound on the influence of a surprising reading.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BoundedInfluence(pub Influence<f64>);
-
-impl FromStr for BoundedInfluence {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        if text == "none" {
-            return Ok(Self(Influence::Full));
-        }
-        let expected =
-            || "expected none, or redescending:K, huber:K or student-t:DOF with a positive number".to_string();
-        let (kind, number) = text.split_once(':').ok_or_else(expected)?;
-        let number = positive(number).map_err(|_| expected())?;
-        match kind {
-            "huber" => Ok(Self(Influence::Huber { threshold: number })),
-            "redescending" => Ok(Self(Influence::Redescending { threshold: number })),
-            "student-t" => Ok(Self(Influence::StudentT { degrees_of_freedom: number })),
-            _ => Err(expected()),
-        }
-    }
 }
 
 /// A strain that is known at a time, T:X or T:X:SD.

@@ -4,7 +4,7 @@ use std::str::FromStr;
 use clap::{Args as ClapArgs, ValueEnum};
 use ohmstrain_sensor::EstimatorKind;
 
-use super::{Estimator, ReplaceArgs, ReportArgs, RestResistance, Split, UnitArgs, finite, positive};
+use super::{ReplaceArgs, ReportArgs, RestResistance, Split, UnitArgs, finite, positive};
 
 /// Flags of `evaluate`.
 #[derive(Debug, ClapArgs)]
@@ -114,7 +114,7 @@ impl FromStr for Estimators {
         match text {
             "auto" => Ok(Self::Auto),
             "all" => Ok(Self::All),
-            name => name.parse().map(|Estimator(kind)| Self::One(kind)).map_err(|expected| expected + " or all"),
+            name => name.parse().map(Self::One).map_err(|expected| expected + " or all"),
         }
     }
 }

@@ -2,8 +2,9 @@ use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
 
-use super::{Auto, Estimator, positive};
+use super::{Auto, positive};
 use ohmstrain_export::{Board, Budget, ExportTarget, Prefix};
+use ohmstrain_sensor::EstimatorKind;
 
 /// A language that sensors are exported to.
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
@@ -43,7 +44,7 @@ pub struct ExportArgs {
     pub dt_s: Option<f64>,
     /// Estimator to export: auto (the sensor's default), corrected, sign-split, hypotheses or ekf
     #[arg(long, default_value = "auto")]
-    pub estimator: Auto<Estimator>,
+    pub estimator: Auto<EstimatorKind>,
     #[arg(long, value_name = "BUDGET", conflicts_with = "estimator", help = budget_help())]
     pub budget: Option<Budget>,
     /// Prefix of names in C: two sensors in one program need names of their own

@@ -3,8 +3,9 @@ use std::str::FromStr;
 
 use clap::Args as ClapArgs;
 use ohmstrain_calib::likelihood::NoiseParameter;
+use ohmstrain_sensor::EstimatorKind;
 
-use super::{Auto, Estimator, ReplaceArgs, RestResistance, UnitArgs, finite};
+use super::{Auto, ReplaceArgs, RestResistance, UnitArgs, finite};
 
 /// Flags of `refine`.
 #[derive(Debug, ClapArgs)]
@@ -29,7 +30,7 @@ pub struct RefineArgs {
     pub until: Option<f64>,
     /// Estimator to refine: auto (ekf) or ekf, the only one whose likelihood has exact derivatives
     #[arg(long, default_value = "auto")]
-    pub estimator: Auto<Estimator>,
+    pub estimator: Auto<EstimatorKind>,
     /// Parameters to move, separated by commas; all by default: reading_sd, branch_sd, baseline_sd, baseline_time_s,
     /// rate_sd_per_s, rate_time_s
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]

@@ -2,8 +2,9 @@ use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
 
-use super::{Auto, Estimator, positive};
+use super::{Auto, positive};
 use ohmstrain_export::Budget;
+use ohmstrain_sensor::EstimatorKind;
 
 /// Flags of `serial-check`.
 #[derive(Debug, ClapArgs)]
@@ -17,7 +18,7 @@ pub struct SerialCheckArgs {
     pub dt_s: Option<f64>,
     /// Estimator that was exported
     #[arg(long, default_value = "auto")]
-    pub estimator: Auto<Estimator>,
+    pub estimator: Auto<EstimatorKind>,
     /// Budget that it was exported for, if it was not scored
     #[arg(long, value_name = "BUDGET", conflicts_with = "estimator")]
     pub budget: Option<Budget>,

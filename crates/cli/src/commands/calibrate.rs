@@ -131,12 +131,12 @@ pub fn calibrate(args: &CalibrateArgs, messages: &Messages) -> Result<Outcome, C
         };
         wanted.put(reporting.drawn()?, &mut outputs)?;
     }
-    if let Some(chosen) = args.estimator.chosen().filter(|chosen| chosen.0 != EstimatorKind::Corrected)
+    if let Some(chosen) = args.estimator.chosen().filter(|chosen| *chosen != EstimatorKind::Corrected)
         && closing.is_better() == Some(false)
     {
         messages.warning(&format!(
             "{file}: {} is no better than a static curve; without --estimator, calibrate tries others and a correction",
-            chosen.0.name()
+            chosen.name()
         ));
     }
     outcome.explained = explain::text(args, &recordings, &outcome.sensor.params().law)?;
@@ -156,11 +156,11 @@ pub fn rows_in(args: &CalibrateArgs, recording: &TraceFile) -> Result<Range<usiz
 /// Returns the calibration that the flags ask for.
 pub fn calibration(args: &CalibrateArgs) -> Calibration<'static> {
     let mut calibration = Calibration::new();
-    if let Some(estimator) = args.estimator.chosen() {
-        calibration = calibration.estimator(estimator.0);
+    if let Some(kind) = args.estimator.chosen() {
+        calibration = calibration.estimator(kind);
     }
-    if let Some(gauge) = args.gauge.chosen() {
-        calibration = calibration.gauge(gauge.0);
+    if let Some(family) = args.gauge.chosen() {
+        calibration = calibration.gauge(family);
     }
     if let Some(Coefficients(coefficients)) = args.temperature {
         calibration = calibration.temperature(coefficients);

@@ -18,7 +18,7 @@ pub fn run(args: &ExportArgs) -> Result<(), CliError> {
     if sensor_file::is_of_a_hand(&args.sensor) {
         return hand::export::run(args, &args.sensor);
     }
-    let asked = args.estimator.chosen().map(|estimator| estimator.0);
+    let asked = args.estimator.chosen();
     if let Some(other) = asked.filter(|kind| !export::FILTERS.contains(kind)) {
         let message = "--estimator: expected corrected, sign-split, hypotheses or ekf, found";
         return Err(CliError::Arguments(format!("{message} {}", other.name())));

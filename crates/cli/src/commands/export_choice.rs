@@ -31,7 +31,7 @@ pub fn choose(
     dt_s: f64,
     recording: Option<&OnRecording>,
 ) -> Result<Choice, CliError> {
-    let asked = args.estimator.chosen().map(|estimator| estimator.0);
+    let asked = args.estimator.chosen();
     match &args.budget {
         Some(budget) => within(args, params, dt_s, budget, recording),
         None => Ok(Choice { plan: Plan { kind: asked, ..Plan::default() }, lines: Vec::new() }),

@@ -26,8 +26,8 @@ impl OnRecording {
         let (recording, sensor) = (recording.at_reference_temperature(sensor), &recording.sensor_for(sensor));
         let refused = |error: &dyn std::fmt::Display| CliError::Input(format!("{}: {error}", recording.name));
         let mut builder = sensor.filter();
-        if let Some(estimator) = args.estimator.chosen() {
-            builder = builder.estimator(estimator.0);
+        if let Some(kind) = args.estimator.chosen() {
+            builder = builder.estimator(kind);
         }
         let mut filter = builder.build().map_err(|error| refused(&error))?;
         let mut cubic = ohmstrain_calib::running_cubic(sensor.params().static_cubic);

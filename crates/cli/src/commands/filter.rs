@@ -24,7 +24,7 @@ use crate::whole_file::is_stdin;
 
 /// Turns readings into strain as they arrive, and returns the number of rows. Memory does not grow with the recording.
 pub fn run(args: &FilterArgs, messages: &Messages) -> Result<u64, CliError> {
-    let kind = args.estimate.estimator.chosen().map(|estimator| estimator.0);
+    let kind = args.estimate.estimator.chosen();
     let WrittenArgs { output, replace, columns, .. } = &args.written;
     let inputs = [&args.trace_file, &args.estimate.sensor];
     let mut rows_out = RowsOut::claim(output.as_deref(), columns, replace.force, inputs)?;

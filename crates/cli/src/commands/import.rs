@@ -71,14 +71,9 @@ fn numbered(path: &Path, number: usize) -> PathBuf {
 
 /// Returns the text of a trace.
 fn trace(plan: &Plan, tables: &[Table], messages: &Messages) -> Result<Vec<u8>, CliError> {
-    let mut imported = plan.import(tables)?;
-    let other = &mut imported.trace.metadata.other;
-    other.retain(|(key, _)| key != "made_by");
-    other.push(("made_by".into(), format!("{MADE_BY} {IMPORT}")));
+    let imported = plan.import(tables)?;
     imported.remarks.iter().for_each(|remark| messages.remark(remark));
-    let mut bytes = Vec::new();
-    imported.trace.write(&mut bytes)?;
-    Ok(bytes)
+    Ok(imported.trace.marked(&format!("{MADE_BY} {IMPORT}"))?)
 }
 
 /// Lists the channels with their references.
@@ -92,7 +87,7 @@ fn name_channels(plan: &EachPlan, tables: &[Table], messages: &Messages) {
 /// Returns the text of a recording of all channels.
 fn each(plan: &EachPlan, tables: &[Table], messages: &Messages) -> Result<Vec<u8>, CliError> {
     let mut trace = plan.import(tables)?;
-    trace.metadata.other.push(("made_by".into(), format!("{MADE_BY} {IMPORT}")));
+    trace.metadata.set_made_by(&format!("{MADE_BY} {IMPORT}"));
     trace.remarks.iter().for_each(|remark| messages.remark(remark));
     let mut bytes = Vec::new();
     trace.write(&mut bytes)?;

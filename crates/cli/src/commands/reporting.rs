@@ -85,7 +85,7 @@ impl Reporting<'_> {
         let cubic = scoring::of_baseline(recording, ohmstrain_calib::running_cubic(params.static_cubic), part, moved);
         let rows = [("filter", filter), ("smoother", smoother), ("static cubic", cubic)];
         let scores: Vec<ScoreRow> =
-            rows.into_iter().filter_map(|(name, scores)| scores.map(|scores| ScoreRow::new(name, &scores))).collect();
+            rows.into_iter().filter_map(|(name, scores)| scores.map(|scores| ScoreRow { name, scores })).collect();
         let name =
             Path::new(&recording.name).file_name().map_or_else(String::new, |name| name.to_string_lossy().into());
         let input = ReportInput {

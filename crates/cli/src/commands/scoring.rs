@@ -6,7 +6,7 @@ use ohmstrain_sensor::Scores;
 use ohmstrain::trace::TraceFile;
 
 /// Scores the rows of `part` with strain and deviation from `estimate`; `None` without a reference.
-fn scores(recording: &TraceFile, part: Scored, estimate: impl Fn(usize) -> (f64, Option<f64>)) -> Option<Scores> {
+pub fn scores(recording: &TraceFile, part: Scored, estimate: impl Fn(usize) -> (f64, Option<f64>)) -> Option<Scores> {
     let times = &recording.trace.time_s;
     let rows: Vec<ScoredRow> = (0..times.len())
         .filter(|&k| part.holds(times[k]))

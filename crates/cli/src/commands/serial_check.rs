@@ -27,7 +27,7 @@ const OTHER_FLAGS: f64 = 0.01;
 
 /// Compares a board's estimates with those of the exported code's twin, given the board's readings.
 pub fn run(args: &SerialCheckArgs) -> Result<(), CliError> {
-    let asked = args.estimator.chosen().map(|estimator| estimator.0);
+    let asked = args.estimator.chosen();
     let sensor = sensor_file::read(&args.sensor, asked)?;
     let name = args.sensor.display().to_string();
     let params = sensor.params();

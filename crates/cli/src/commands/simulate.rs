@@ -1,6 +1,5 @@
 use std::path::Path;
 
-use ohmstrain_bench_data::Trace;
 use ohmstrain_bench_data::simulate::{Followed, Protocol, SimulationSettings, simulate};
 
 use crate::args::{ExampleArgs, ReplaceArgs, SimulateArgs};
@@ -67,9 +66,6 @@ fn write(settings: &SimulationSettings, file: Option<&Path>, replace: &ReplaceAr
 
 /// Returns a simulated recording as text, marked as simulated, so that another may replace it.
 pub fn bytes(settings: &SimulationSettings) -> Result<Vec<u8>, String> {
-    let mut trace: Trace = simulate(settings).map_err(|error| error.to_string())?;
-    trace.metadata.other.push(("made_by".into(), format!("{MADE_BY} {SIMULATE}")));
-    let mut bytes = Vec::new();
-    trace.write(&mut bytes).map_err(|error| error.to_string())?;
-    Ok(bytes)
+    let trace = simulate(settings).map_err(|error| error.to_string())?;
+    trace.marked(&format!("{MADE_BY} {SIMULATE}")).map_err(|error| error.to_string())
 }

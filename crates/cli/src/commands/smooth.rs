@@ -23,7 +23,7 @@ pub fn run(args: &SmoothArgs, messages: &Messages) -> Result<u64, CliError> {
     if sensor_file::is_of_a_hand(&args.estimate.sensor) {
         return hand::smooth::run(args, messages);
     }
-    let wanted = args.estimate.estimator.chosen().map(|estimator| estimator.0);
+    let wanted = args.estimate.estimator.chosen();
     let WrittenArgs { output, replace, columns, .. } = &args.written;
     let inputs = [&args.trace_file, &args.estimate.sensor];
     let mut rows_out = RowsOut::claim(output.as_deref(), columns, replace.force, inputs)?;

@@ -1,42 +1,7 @@
 use crate::Recordable;
 
-/// Exponential low-pass, τ L′ = y − L, exact for readings that change linearly between known readings, for any step
-/// length. It starts settled on the first reading.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LowPass<T> {
-    tau_s: T,
-    last: Option<T>,
-    value: T,
-}
-
-impl<T: Recordable> LowPass<T> {
-    /// Creates a low-pass before the first reading; the time constant, s, is positive.
-    #[must_use]
-    pub fn new(tau_s: T) -> Self {
-        Self { tau_s, last: None, value: T::zero() }
-    }
-
-    /// The time constant, s.
-    #[must_use]
-    pub const fn tau_s(&self) -> T {
-        self.tau_s
-    }
-
-    /// The low-pass at the last reading; zero before the first.
-    #[must_use]
-    pub const fn value(&self) -> T {
-        self.value
-    }
-
-    /// Takes a reading `dt_s ≥ 0` seconds after the previous one, and returns the low-pass at its time.
-    pub fn next(&mut self, dt_s: T, reading: T) -> T {
-        self.value = self.last.map_or(reading, |last| Decay::over(dt_s, self.tau_s).moved(self.value, last, reading));
-        self.last = Some(reading);
-        self.value
-    }
-}
-
-/// Decay of a low-pass over a step.
+/// Decay over a step of an exponential low-pass, τ L′ = y − L, exact for readings that change linearly between known
+/// readings, for any step length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Decay<T> {
     /// exp(-x), with x the step in time constants.

@@ -28,7 +28,7 @@ use ohmstrain_model::StrainRange;
 use crate::kernel::{Several, Work};
 use crate::{Gaussian, Real, Recordable};
 pub use features::{FARTHEST, FEATURES, FeatureScale, RATE_GAIN, ReadingFeatures, Starts, TIME_CONSTANTS_S, settled};
-pub use low_pass::{Decay, LowPass};
+pub use low_pass::Decay;
 use process::{Kernels, Prediction};
 pub use process::{LINEAR, Process, kernel};
 pub use quadratic::Quadratic;

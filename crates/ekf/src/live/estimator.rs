@@ -38,43 +38,27 @@ where
     }
 }
 
-impl<T, S, G, const B: usize, const N: usize, const L: usize, const K: usize> SensorEstimator<T, N, L>
-    for SignSplit<T, B, N, K, S, G>
-where
-    T: Real,
-    S: Switch<T>,
-    G: Curve<T>,
-{
-    const BRANCHES: usize = B;
+/// Implements [`SensorEstimator`] for filters that start with a single hypothesis, in the given phase.
+macro_rules! with_phases {
+    ($($filter:ty $([$hypotheses:ident])? => $state:ty, $phase:expr;)+) => {$(
+        impl<T, S, G, const B: usize, const N: usize, const L: usize $(, const $hypotheses: usize)?>
+            SensorEstimator<T, N, L> for $filter
+        where
+            T: Real,
+            S: Switch<T>,
+            G: Curve<T>,
+        {
+            const BRANCHES: usize = B;
 
-    fn start(&self, strain: Option<Gaussian<T>>) -> Mixture<T, N, L, K> {
-        Mixture::single(belief(self.model(), strain), Phase::Extend)
-    }
+            fn start(&self, strain: Option<Gaussian<T>>) -> $state {
+                <$state>::single(belief(self.model(), strain), $phase)
+            }
+        }
+    )+};
 }
 
-impl<T, S, G, const B: usize, const N: usize, const L: usize, const K: usize> SensorEstimator<T, N, L>
-    for Hypotheses<T, B, N, K, S, G>
-where
-    T: Real,
-    S: Switch<T>,
-    G: Curve<T>,
-{
-    const BRANCHES: usize = B;
-
-    fn start(&self, strain: Option<Gaussian<T>>) -> Mixture<T, N, L, K> {
-        Mixture::single(belief(self.model(), strain), Phase::Hold)
-    }
-}
-
-impl<T, S, G, const B: usize, const N: usize, const L: usize> SensorEstimator<T, N, L> for Imm<T, B, N, S, G>
-where
-    T: Real,
-    S: Switch<T>,
-    G: Curve<T>,
-{
-    const BRANCHES: usize = B;
-
-    fn start(&self, strain: Option<Gaussian<T>>) -> PhaseMixture<T, N, L> {
-        PhaseMixture::single(belief(self.model(), strain), Phase::Hold)
-    }
+with_phases! {
+    SignSplit<T, B, N, K, S, G> [K] => Mixture<T, N, L, K>, Phase::Extend;
+    Hypotheses<T, B, N, K, S, G> [K] => Mixture<T, N, L, K>, Phase::Hold;
+    Imm<T, B, N, S, G> => PhaseMixture<T, N, L>, Phase::Hold;
 }

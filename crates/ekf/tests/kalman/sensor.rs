@@ -37,7 +37,7 @@ fn step(model: &SwitchedModel<f64, 2, 5>, state: &Normal<f64, 5>, reading: Optio
 /// deviations of the prior.
 #[test]
 fn the_sensors_filters_are_instances() {
-    let model = sensor::<f64>(1.0);
+    let model = sensor::<f64>();
     let (ekf, sparse) = (Ekf::new(model), SparseEkf::<f64, Logistic, 2, 5>::new(model, DT_S).unwrap());
     let start = Belief::<f64, 5, 15>::initial(&model);
     let mut state = Normal::new(start.mean, &start.covariance.to_matrix()).unwrap();

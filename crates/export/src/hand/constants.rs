@@ -4,11 +4,10 @@ use ohmstrain_sensor::ReadingUnit;
 use ohmstrain_sensor::fusion::{PRIOR_SD, UNLIKE};
 use serde::Serialize;
 
-use super::fused::{ChipFusion, Errors};
-use super::process::Process;
+use super::fused::ChipFusion;
 use super::twin::{HandVectors, Twin};
 use super::{HandChannel, HandJoint};
-use crate::literal::{Literal, literals};
+use crate::literal::Literal;
 use crate::prefix::WRITTEN;
 use crate::{ExportError, Plan, cost};
 use ohmstrain::MADE_BY;
@@ -88,35 +87,8 @@ struct JointConstants {
 #[derive(Debug, Serialize)]
 struct FusionConstants {
     joint: String,
-    lower: Literal,
-    upper: Literal,
-    low_pass_s: Vec<Literal>,
-    rows: Vec<Vec<Literal>>,
-    per_sd: Vec<Literal>,
-    novelty: Literal,
-    processes: Vec<ProcessConstants>,
-    all: ErrorConstants,
-    filters: ErrorConstants,
-}
-
-#[derive(Debug, Serialize)]
-struct ErrorConstants {
-    sd_scale: Literal,
-    covariance: Vec<Vec<Literal>>,
-}
-
-#[derive(Debug, Serialize)]
-struct ProcessConstants {
-    low_passes: Vec<usize>,
-    mean: Vec<Literal>,
-    per_sd: Vec<Literal>,
-    rows: Vec<Vec<Literal>>,
-    factor: Vec<Vec<Literal>>,
-    weights: Vec<Literal>,
-    spread: Vec<Vec<Literal>>,
-    per_length: Literal,
-    noise_variance: Literal,
-    mean_strain: Literal,
+    #[serde(flatten)]
+    fusion: ChipFusion<Literal>,
 }
 
 /// Sizes of arrays that hold any fusion.
@@ -136,6 +108,10 @@ impl HandConstants {
         let mut most = Most::default();
         fused().for_each(|(_, fusion)| most.include(fusion));
         let of_joint = |(joint, per_strain): (&HandJoint, &(f32, f32))| joint_constants(joint, *per_strain);
+        let of_fusion = |(joint, fusion): (&HandJoint, &ChipFusion<f32>)| FusionConstants {
+            joint: name_in_c(&joint.name),
+            fusion: fusion.map(Literal),
+        };
         let costs = costs(joints, &twin, &most, plan, dt_s)?;
         let constants = Self {
             costs,
@@ -146,7 +122,7 @@ impl HandConstants {
             dt_ms: (1e6 * dt_s).round() / 1e3,
             channels: joints.iter().flat_map(|joint| joint.channels.iter().map(|one| channel(joint, one))).collect(),
             joints: joints.iter().zip(&twin.scales).map(of_joint).collect(),
-            fusions: fused().map(|(joint, fusion)| fusion_constants(joint, fusion)).collect(),
+            fusions: fused().map(of_fusion).collect(),
             most,
             prior_variance: Literal((PRIOR_SD * PRIOR_SD) as f32),
             unlike: Literal(UNLIKE as f32),
@@ -214,41 +190,6 @@ fn joint_constants(joint: &HandJoint, (at_zero, per_strain): (f32, f32)) -> Join
         at_zero: Literal(at_zero),
         per_strain: Literal(per_strain),
         name,
-    }
-}
-
-fn table(rows: &[Vec<f32>]) -> Vec<Vec<Literal>> {
-    rows.iter().map(literals).collect()
-}
-
-fn fusion_constants(joint: &HandJoint, fusion: &ChipFusion<f32>) -> FusionConstants {
-    let errors = |errors: &Errors<f32>| ErrorConstants {
-        sd_scale: Literal(errors.sd_scale),
-        covariance: table(&errors.covariance),
-    };
-    let process = |process: &Process<f32>| ProcessConstants {
-        low_passes: process.low_passes.clone(),
-        mean: literals(&process.mean),
-        per_sd: literals(&process.per_sd),
-        rows: table(&process.rows),
-        factor: table(&process.factor),
-        weights: literals(&process.weights),
-        spread: table(&process.spread),
-        per_length: Literal(process.per_length),
-        noise_variance: Literal(process.noise_variance),
-        mean_strain: Literal(process.mean_strain),
-    };
-    FusionConstants {
-        joint: name_in_c(&joint.name),
-        lower: Literal(fusion.lower),
-        upper: Literal(fusion.upper),
-        low_pass_s: literals(&fusion.low_pass_s),
-        rows: table(&fusion.rows),
-        per_sd: literals(&fusion.per_sd),
-        novelty: Literal(fusion.novelty),
-        processes: fusion.processes.iter().map(process).collect(),
-        all: errors(&fusion.all),
-        filters: errors(&fusion.filters),
     }
 }
 

@@ -2,6 +2,7 @@
 
 use nalgebra::RealField;
 use ohmstrain_sensor::fusion::{FusionErrors, FusionParams, PRIOR_SD, UNLIKE};
+use serde::Serialize;
 
 use super::process::Process;
 use crate::ExportError;
@@ -10,7 +11,7 @@ use crate::ExportError;
 const FEWEST: usize = 3;
 
 /// Constants of a fusion. With readings of all channels its members are the channels' filters and the processes, else the filters alone.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct ChipFusion<T> {
     pub lower: T,
     pub upper: T,
@@ -28,7 +29,7 @@ pub struct ChipFusion<T> {
 }
 
 /// Errors of members: the factor on the fused deviation, and covariances in units of the members' deviations.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct Errors<T> {
     pub sd_scale: T,
     pub covariance: Vec<Vec<T>>,

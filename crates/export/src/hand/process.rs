@@ -1,7 +1,8 @@
 //! A regression of the fusion for a microcontroller: a Gaussian process on a few inducing rows.
 
 use nalgebra::{Cholesky, DMatrix, DVector, RealField};
-use ohmstrain_sensor::fusion::{FusionParams, PRIOR_SD, RegressionParams};
+use ohmstrain_sensor::fusion::{FusionParams, PRIOR_SD, RegressionParams, scaled_inputs};
+use serde::Serialize;
 
 /// Largest number of inducing rows.
 const MOST_INDUCING: usize = 96;
@@ -16,7 +17,7 @@ const EXPLAINED: f64 = 0.01;
 ///
 /// Source: J. Quiñonero-Candela, C. E. Rasmussen, A unifying view of sparse approximate Gaussian process regression, *JMLR* 6 (2005)
 /// 1939–1959, equation 20 (deterministic training conditional).
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct Process<T> {
     /// Indices of the low-passes that it sees.
     pub low_passes: Vec<usize>,
@@ -61,19 +62,9 @@ fn kernel<T: RealField + Copy>(a: &[T], b: &[T], per_length: T) -> T {
 impl Process<f64> {
     /// Conditions a process on the rows of a fusion; `None` if a matrix is not positive definite.
     pub fn new(params: &FusionParams, regression: &RegressionParams) -> Option<Self> {
-        let raw: Vec<Vec<f64>> =
-            params.rows.iter().map(|row| inputs(&regression.low_passes, &row.ln_r, &row.low_passed)).collect();
-        let count = raw.len() as f64;
-        let of_input = |input: usize| {
-            let mean = raw.iter().map(|row| row[input]).sum::<f64>() / count;
-            let sd = (raw.iter().map(|row| (row[input] - mean).powi(2)).sum::<f64>() / count).sqrt();
-            (mean, if sd > 1e-9 { 1.0 / sd } else { 0.0 })
-        };
-        let (mean, per_sd): (Vec<f64>, Vec<f64>) = (0..raw.first()?.len()).map(of_input).unzip();
-        let scaled = |row: &Vec<f64>| -> Vec<f64> {
-            row.iter().zip(&mean).zip(&per_sd).map(|((value, mean), per_sd)| (value - mean) * per_sd).collect()
-        };
-        let all: Vec<Vec<f64>> = raw.iter().map(scaled).collect();
+        let channels: Vec<usize> = (0..params.channels()).collect();
+        let (scale, all) = scaled_inputs(&params.rows, regression, &channels)?;
+        let (mean, per_sd): (Vec<f64>, Vec<f64>) = scale.into_iter().unzip();
         let per_length = 0.5 / (regression.length * regression.length);
         let noise_variance = regression.noise * regression.noise;
         let (chosen, features) = pivoted(&all, per_length, EXPLAINED * noise_variance);
@@ -83,7 +74,7 @@ impl Process<f64> {
         (0..rows.len()).for_each(|i| posterior[(i, i)] += noise_variance);
         let cholesky = Cholesky::new(posterior)?;
         let span = params.limits.span();
-        let mean_strain = params.rows.iter().map(|row| row.strain).sum::<f64>() / count;
+        let mean_strain = params.rows.iter().map(|row| row.strain).sum::<f64>() / params.rows.len() as f64;
         let targets =
             DVector::from_iterator(all.len(), params.rows.iter().map(|row| (row.strain - mean_strain) / span));
         let weights = cholesky.solve(&(&features * targets));

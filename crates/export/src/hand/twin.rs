@@ -1,15 +1,13 @@
 //! Twin of an exported hand: the numbers that its self-test expects.
 
 use ohmstrain_sensor::SensorParams;
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::SeedableRng;
-use rand_distr::{Distribution, StandardNormal};
 use serde::Serialize;
 
 use super::fused::{ChipChannel, ChipFused, ChipFusion};
 use super::{HandChannel, HandJoint};
 use crate::literal::Literal;
 use crate::replay::replay_from;
+use crate::vectors::{FURTHER, ROUNDINGS, other_rounding};
 use crate::{ChipEstimate, ExportError, Plan, ReplayedRow};
 
 /// Number of rows of the self-test, and of rows between two of the calibration; one channel of each fused joint is open in some, and has
@@ -21,14 +19,9 @@ const OTHER_GAIN: std::ops::Range<usize> = 80..95;
 const GAIN: f64 = 1.8;
 /// Number of beginnings that are tried: where rounding decides which hypotheses are merged nothing can be compared.
 const BEGINNINGS: usize = 6;
-/// Number of runs with other roundings of the readings, and their relative deviation, as for one sensor.
-const ROUNDINGS: u64 = 6;
-const ROUNDED_BY: f64 = 2.0 * f32::EPSILON as f64;
 /// Flags of a reading that the filter does not use: missing, implausible, stuck.
 const UNREAD: u32 = 1 | 2 | 4;
-/// Factor by which another compiler may be further from exact arithmetic than Rust's `f32` is, and the least difference that is
-/// allowed, standard deviations: implementations of `expf` and `logf` differ by a unit in the last place.
-const FURTHER: f64 = 3.0;
+/// Least difference that is allowed, standard deviations: implementations of `expf` and `logf` differ by a unit in the last place.
 const LEAST_SD: f64 = 1e-3;
 
 /// All joints as the exported code has them.
@@ -86,11 +79,8 @@ impl Twin {
                 joints.iter().flat_map(|joint| readings(joint, beginning * ROWS / BETWEEN)).collect();
             let (rows, mut effect) = self.run(joints, plan, dt_s, &readings)?;
             for seed in 0..ROUNDINGS {
-                let mut random = ChaCha8Rng::seed_from_u64(seed);
-                let mut rounded = |reading: &f64| {
-                    let normal: f64 = StandardNormal.sample(&mut random);
-                    f64::from((reading * (1.0 + ROUNDED_BY * normal)) as f32)
-                };
+                let mut rounded = other_rounding(seed);
+                let mut rounded = |reading: &f64| f64::from(rounded(*reading));
                 let others: Vec<Vec<f64>> =
                     readings.iter().map(|of_channel| of_channel.iter().map(&mut rounded).collect()).collect();
                 let (other, _) = self.run(joints, plan, dt_s, &others)?;

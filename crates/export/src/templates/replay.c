@@ -18,22 +18,7 @@ enum { LONGEST_LINE = 4096 };
 static const char MARK[] = "\xEF\xBB\xBF";
 
 /* Cuts the next cell off a line, without spaces around it; null at the end. */
-static char *next_cell(char **line)
-{
-    char *cell = *line, *end;
-
-    if (!cell) {
-        return cell;
-    }
-    cell += strspn(cell, " \t");
-    end = cell + strcspn(cell, ",\r\n");
-    *line = *end == ',' ? end + 1 : (char *)0;
-    while (end > cell && (end[-1] == ' ' || end[-1] == '\t')) {
-        end--;
-    }
-    *end = 0;
-    return cell;
-}
+{% include "cells.c" %}
 
 /* The factor of a time column to seconds; 0 for others. */
 static double time_unit(const char *name)

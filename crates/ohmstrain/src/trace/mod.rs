@@ -15,6 +15,7 @@ use ohmstrain_calib::{Distrusted, Samples, SamplesError, aligned};
 use ohmstrain_sensor::{JointParams, Quantity, ReadingUnit};
 use thiserror::Error;
 
+pub use crate::column::reading_column;
 use crate::number::significant;
 use crate::{CalibrationDoubt, Error, Interface, Reading, Recording, Sensor};
 pub use hand::{HAND_FORMAT, HandChannel, HandDescription, HandError, HandJoint};
@@ -335,15 +336,6 @@ const fn unit(kind: ReadingKind) -> ReadingUnit {
     match kind {
         ReadingKind::Ohm => ReadingUnit::Ohm,
         ReadingKind::Ratio => ReadingUnit::Ratio,
-    }
-}
-
-/// Returns the name of the column with readings of a unit.
-#[must_use]
-pub const fn reading_column(unit: ReadingUnit) -> &'static str {
-    match unit {
-        ReadingUnit::Ohm => "resistance_ohm",
-        ReadingUnit::Ratio => "resistance_ratio",
     }
 }
 

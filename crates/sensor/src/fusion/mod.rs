@@ -18,7 +18,7 @@ pub use combine::{Member, combine};
 pub use low_passes::LowPasses;
 pub use novelty::distance;
 pub use params::{FUSION_FORMAT, FusionErrors, FusionParams, FusionRow, MOST_CHANNELS, RegressionParams};
-pub use regression::{FusionReadings, PRIOR_SD, Regression};
+pub use regression::{FusionReadings, PRIOR_SD, Regression, scaled_inputs};
 
 /// Multiple of [`FusionParams::novelty`] beyond which a row counts as unlike the calibration.
 pub const UNLIKE: f64 = 1.5;

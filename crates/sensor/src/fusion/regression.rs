@@ -21,6 +21,9 @@ impl<'a> From<&'a FusionRow> for FusionReadings<'a> {
     }
 }
 
+/// Mean and inverse standard deviation of each input.
+type Scale = Vec<(f64, f64)>;
+
 /// Gaussian process of the strain on a subset of the channels, conditioned on rows of the calibration. Its kernel is the sum of a
 /// squared exponential and a linear one.
 ///
@@ -32,8 +35,7 @@ pub struct Regression {
     /// Range of the strain.
     span: f64,
     mean_strain: f64,
-    /// Mean and inverse standard deviation of each input.
-    scale: Vec<(f64, f64)>,
+    scale: Scale,
     /// Inputs of each row, scaled.
     inputs: Vec<Vec<f64>>,
     factor: Cholesky<f64, Dyn>,
@@ -45,13 +47,10 @@ impl Regression {
     /// definite.
     #[must_use]
     pub fn new(rows: &[&FusionRow], params: &RegressionParams, channels: &[usize], span: f64) -> Option<Self> {
-        let of_row = |row: &&FusionRow| raw_inputs(params, channels, FusionReadings::from(*row)).collect::<Vec<f64>>();
         if channels.is_empty() {
             return None;
         }
-        let raw: Vec<Vec<f64>> = rows.iter().map(of_row).collect();
-        let scale: Vec<(f64, f64)> = (0..raw.first()?.len()).map(|input| location(&raw, input)).collect();
-        let inputs: Vec<Vec<f64>> = raw.iter().map(|row| scaled(row.iter().copied(), &scale)).collect();
+        let (scale, inputs) = scaled_inputs(rows.iter().copied(), params, channels)?;
         let mean_strain = rows.iter().map(|row| row.strain).sum::<f64>() / rows.len() as f64;
         let noise = params.noise * params.noise;
         let covariance = DMatrix::from_fn(rows.len(), rows.len(), |i, j| {
@@ -85,6 +84,21 @@ impl Regression {
         let variance = (prior - covariance.norm_squared()).max(0.0) + self.params.noise * self.params.noise;
         Member { strain: self.mean_strain + mean * self.span, sd: variance.sqrt() * self.span }
     }
+}
+
+/// Scales the inputs of rows. Returns the mean and inverse standard deviation of each input, and the scaled inputs of each row;
+/// `None` without a row.
+#[must_use]
+pub fn scaled_inputs<'a>(
+    rows: impl IntoIterator<Item = &'a FusionRow>,
+    params: &RegressionParams,
+    channels: &[usize],
+) -> Option<(Scale, Vec<Vec<f64>>)> {
+    let of_row = |row: &FusionRow| raw_inputs(params, channels, FusionReadings::from(row)).collect::<Vec<f64>>();
+    let raw: Vec<Vec<f64>> = rows.into_iter().map(of_row).collect();
+    let scale: Scale = (0..raw.first()?.len()).map(|input| location(&raw, input)).collect();
+    let inputs = raw.iter().map(|row| scaled(row.iter().copied(), &scale)).collect();
+    Some((scale, inputs))
 }
 
 /// Returns the inputs of a row: ln R of each channel and, for each low-pass, the difference of ln R from it.

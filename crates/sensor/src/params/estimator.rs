@@ -1,3 +1,5 @@
+use std::str::FromStr;
+
 use ohmstrain_ekf::live::news;
 use ohmstrain_ekf::{Dwell, Settling};
 use ohmstrain_model::{ModelNoise, Motion, ParameterError};
@@ -63,6 +65,16 @@ impl EstimatorKind {
             Self::Hypotheses => "hypotheses",
             Self::Corrected => "corrected",
         }
+    }
+}
+
+/// Parses a name; the error also lists `auto`, which callers take for no choice.
+impl FromStr for EstimatorKind {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        let found = Self::ALL.into_iter().find(|kind| kind.name() == name);
+        found.ok_or_else(|| format!("expected auto or {}", Self::ALL.map(Self::name).join(", ")))
     }
 }
 

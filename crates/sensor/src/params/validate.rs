@@ -9,7 +9,7 @@ pub mod table;
 pub use table::FieldError;
 use table::{
     AMOUNT, ANY_NUMBER, Allowed, FACTOR, GAIN, LARGEST_CHANGE, NON_NEGATIVE, POSITIVE, RATE, SHARE, SIGNED, SPREAD,
-    Table, short,
+    Table, check, short,
 };
 
 use crate::params::estimator::{EstimatorParams, MotionParams, NoiseParams, PhaseParams, SettlingParams};
@@ -42,7 +42,7 @@ impl SensorParams {
     pub fn validate(&self) -> Result<(), FieldError> {
         let root = Table::root();
         root.number("rest_reading", self.rest_reading, POSITIVE)?;
-        self.measured_rest.map_or(Ok(()), |measured| root.number("measured_rest", measured, POSITIVE))?;
+        root.some("measured_rest", self.measured_rest, POSITIVE)?;
         if let Some(summary) = &self.summary {
             summary.validate(&root.table("summary"))?;
         }
@@ -97,32 +97,34 @@ fn ends(table: &Table, names: [&str; 2], lower: f64, upper: f64, allowed: Allowe
 impl Summary {
     fn validate(&self, table: &Table) -> Result<(), FieldError> {
         table.number("left_out_percent_fs", self.left_out_percent_fs, NON_NEGATIVE)?;
-        self.smoothed_percent_fs.map_or(Ok(()), |error| table.number("smoothed_percent_fs", error, NON_NEGATIVE))?;
-        table.number("static_cubic_percent_fs", self.static_cubic_percent_fs, NON_NEGATIVE)?;
-        table.number("coverage_95_percent", self.coverage_95_percent, NON_NEGATIVE)?;
-        table.number("width_95_percent_fs", self.width_95_percent_fs, NON_NEGATIVE)
+        table.some("smoothed_percent_fs", self.smoothed_percent_fs, NON_NEGATIVE)?;
+        check!(
+            table, self;
+            static_cubic_percent_fs: NON_NEGATIVE, coverage_95_percent: NON_NEGATIVE,
+            width_95_percent_fs: NON_NEGATIVE,
+        )
     }
 }
 
 impl TestedSummary {
     fn validate(&self, table: &Table) -> Result<(), FieldError> {
-        table.number("filter_percent_fs", self.filter_percent_fs, NON_NEGATIVE)?;
-        table.number("static_cubic_percent_fs", self.static_cubic_percent_fs, NON_NEGATIVE)?;
-        table.number("coverage_95_percent", self.coverage_95_percent, NON_NEGATIVE)
+        check!(
+            table, self;
+            filter_percent_fs: NON_NEGATIVE, static_cubic_percent_fs: NON_NEGATIVE,
+            coverage_95_percent: NON_NEGATIVE,
+        )
     }
 }
 
 impl Sessions {
     fn validate(self, table: &Table) -> Result<(), FieldError> {
-        table.number("rest_sd", self.rest_sd, POSITIVE)?;
-        table.number("start_sd", self.start_sd, POSITIVE)
+        check!(table, self; rest_sd: POSITIVE, start_sd: POSITIVE)
     }
 }
 
 impl Unstated {
     fn validate(self, table: &Table) -> Result<(), FieldError> {
-        table.number("filter_sd", self.filter_sd, AMOUNT)?;
-        table.number("smoother_sd", self.smoother_sd, AMOUNT)
+        check!(table, self; filter_sd: AMOUNT, smoother_sd: AMOUNT)
     }
 }
 
@@ -130,10 +132,7 @@ impl TemperatureParams {
     fn validate(self, table: &Table) -> Result<(), FieldError> {
         table.number("reference_c", self.reference_c, CELSIUS)?;
         ends(table, ["lower_c", "upper_c"], self.lower_c, self.upper_c, CELSIUS)?;
-        table.number("rest_per_k", self.rest_per_k, PER_K)?;
-        table.number("rest_per_k_sd", self.rest_per_k_sd, AMOUNT)?;
-        table.number("gain_per_k", self.gain_per_k, PER_K)?;
-        table.number("gain_per_k_sd", self.gain_per_k_sd, AMOUNT)
+        check!(table, self; rest_per_k: PER_K, rest_per_k_sd: AMOUNT, gain_per_k: PER_K, gain_per_k_sd: AMOUNT)
     }
 }
 
@@ -155,25 +154,24 @@ impl Validity {
     pub fn validate(&self, table: &Table) -> Result<(), FieldError> {
         ends(table, ["lower", "upper"], self.lower, self.upper, SIGNED)?;
         ends(table, ["reading_lower", "reading_upper"], self.reading_lower, self.reading_upper, POSITIVE)?;
-        table.number("fastest_rate_per_s", self.fastest_rate_per_s, NON_NEGATIVE)?;
-        table.number("duration_s", self.duration_s, NON_NEGATIVE)?;
-        table.number("longest_repeat_s", self.longest_repeat_s, NON_NEGATIVE)?;
-        self.longest_unturned_s.map_or(Ok(()), |longest_s| table.number("longest_unturned_s", longest_s, POSITIVE))?;
+        check!(
+            table, self;
+            fastest_rate_per_s: NON_NEGATIVE, duration_s: NON_NEGATIVE, longest_repeat_s: NON_NEGATIVE,
+        )?;
+        table.some("longest_unturned_s", self.longest_unturned_s, POSITIVE)?;
         self.resolution.map_or(Ok(()), |resolution| resolution.validate(&table.table("resolution")))
     }
 }
 
 impl Resolution {
     fn validate(self, table: &Table) -> Result<(), FieldError> {
-        table.number("step", self.step, NON_NEGATIVE)?;
-        table.number("noise_sd", self.noise_sd, NON_NEGATIVE)
+        check!(table, self; step: NON_NEGATIVE, noise_sd: NON_NEGATIVE)
     }
 }
 
 impl StaticCubic {
     fn validate(&self, table: &Table) -> Result<(), FieldError> {
-        table.number("reading_centre", self.reading_centre, POSITIVE)?;
-        table.number("reading_scale", self.reading_scale, POSITIVE)?;
+        check!(table, self; reading_centre: POSITIVE, reading_scale: POSITIVE)?;
         table.numbers("coefficients", &self.coefficients, SIGNED)?;
         self.range.validate(&table.table("range"))
     }
@@ -192,17 +190,16 @@ impl JointParams {
 
 impl LawParams {
     fn validate(&self, table: &Table) -> Result<(), FieldError> {
-        table.number("extend_viscosity_s", self.extend_viscosity_s, SIGNED)?;
-        table.number("retract_viscosity_s", self.retract_viscosity_s, SIGNED)?;
+        check!(table, self; extend_viscosity_s: SIGNED, retract_viscosity_s: SIGNED)?;
         self.range.validate(&table.table("range"))?;
         self.gauge.validate(&table.table("gauge"), self.range)?;
         for (index, branch) in self.branches.iter().enumerate() {
             let table = table.entry("branches", index);
-            table.number("tau_s", branch.tau_s, POSITIVE)?;
-            table.number("extend_gain", branch.extend_gain, GAIN)?;
-            table.number("retract_gain", branch.retract_gain, GAIN)?;
-            table.number("extend_gain_slope", branch.extend_gain_slope, GAIN)?;
-            table.number("retract_gain_slope", branch.retract_gain_slope, GAIN)?;
+            check!(
+                table, branch;
+                tau_s: POSITIVE, extend_gain: GAIN, retract_gain: GAIN, extend_gain_slope: GAIN,
+                retract_gain_slope: GAIN,
+            )?;
         }
         Ok(())
     }
@@ -240,11 +237,8 @@ impl GaugeParams {
 
 impl EstimatorParams {
     fn validate(&self, table: &Table, limits: RangeParams) -> Result<(), FieldError> {
-        table.number("score", self.score, ANY_NUMBER)?;
-        table.number("strain_sd_scale", self.strain_sd_scale, FACTOR)?;
-        if let Some(scale) = self.smoothed_sd_scale {
-            table.number("smoothed_sd_scale", scale, FACTOR)?;
-        }
+        check!(table, self; score: ANY_NUMBER, strain_sd_scale: FACTOR)?;
+        table.some("smoothed_sd_scale", self.smoothed_sd_scale, FACTOR)?;
         self.motion.validate(&table.table("motion"), limits)?;
         self.noise.validate(&table.table("noise"))?;
         self.phases.map_or(Ok(()), |phases| phases.validate(&table.table("phases")))?;
@@ -254,10 +248,7 @@ impl EstimatorParams {
 
 impl SettlingParams {
     fn validate(&self, table: &Table) -> Result<(), FieldError> {
-        table.number("horizon_s", self.horizon_s, POSITIVE)?;
-        table.number("share", self.share, SHARE)?;
-        table.number("share_sd", self.share_sd, AMOUNT)?;
-        table.number("sd", self.sd, AMOUNT)
+        check!(table, self; horizon_s: POSITIVE, share: SHARE, share_sd: AMOUNT, sd: AMOUNT)
     }
 }
 
@@ -278,29 +269,27 @@ impl MotionParams {
 
 impl NoiseParams {
     fn validate(&self, table: &Table) -> Result<(), FieldError> {
-        table.number("reading_sd", self.reading_sd, AMOUNT)?;
-        table.number("reading_time_s", self.reading_time_s, AMOUNT)?;
-        table.number("branch_sd", self.branch_sd, AMOUNT)?;
-        table.number("baseline_sd", self.baseline_sd, AMOUNT)?;
-        table.number("baseline_time_s", self.baseline_time_s, POSITIVE)
+        check!(
+            table, self;
+            reading_sd: AMOUNT, reading_time_s: AMOUNT, branch_sd: AMOUNT, baseline_sd: AMOUNT,
+            baseline_time_s: POSITIVE,
+        )
     }
 }
 
 impl PhaseParams {
     fn validate(&self, table: &Table) -> Result<(), FieldError> {
-        table.number("hold_time_s", self.hold_time_s, POSITIVE)?;
-        table.number("move_time_s", self.move_time_s, POSITIVE)?;
-        table.number("reversal", self.reversal, SHARE)?;
-        table.number("speed_per_s", self.speed_per_s, AMOUNT)?;
-        table.number("tempering", self.tempering, SHARE)
+        check!(
+            table, self;
+            hold_time_s: POSITIVE, move_time_s: POSITIVE, reversal: SHARE, speed_per_s: AMOUNT,
+            tempering: SHARE,
+        )
     }
 }
 
 impl RecordingInfo {
     fn validate(&self, table: &Table) -> Result<(), FieldError> {
-        table.number("first_s", self.first_s, ANY_NUMBER)?;
-        table.number("last_s", self.last_s, ANY_NUMBER)?;
-        table.number("rest_reading", self.rest_reading, POSITIVE)
+        check!(table, self; first_s: ANY_NUMBER, last_s: ANY_NUMBER, rest_reading: POSITIVE)
     }
 }
 

@@ -1,5 +1,6 @@
 use nalgebra::{SMatrix, SVector};
 
+use crate::order::{extent, mean};
 use crate::samples::usual_step_s;
 
 /// Number of regressors, the constant included.
@@ -42,7 +43,7 @@ impl ReferenceRegressors {
         let (times, values) = known(times, values);
         let step = step_s(&times)?;
         let (start_s, end_s) = (*times.first()?, *times.last()?);
-        let (low, high) = values.iter().fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(*v), high.max(*v)));
+        let (low, high) = extent(values.iter().copied());
         let step_s = step.max((end_s - start_s) / MOST_MOTION_ROWS);
         let grid = on_grid(&times, &values, step_s);
         let stretch_s = (high - low) / typical_rate(&grid, step_s);
@@ -241,7 +242,7 @@ fn step_s(times: &[f64]) -> Option<f64> {
 /// Returns the mean speed along the path; holds do not count.
 fn typical_rate(grid: &[f64], step_s: f64) -> f64 {
     let window = |i: usize| &grid[i.saturating_sub(SMOOTHED)..(i + SMOOTHED + 1).min(grid.len())];
-    let smooth: Vec<f64> = (0..grid.len()).map(|i| window(i).iter().sum::<f64>() / window(i).len() as f64).collect();
+    let smooth: Vec<f64> = (0..grid.len()).map(|i| mean(window(i).iter().copied())).collect();
     let ways = smooth.windows(2).map(|pair| (pair[1] - pair[0]).abs());
     let (squares, sum) = ways.fold((0.0, 0.0), |(squares, sum), way| (squares + way * way, sum + way));
     squares / sum / step_s

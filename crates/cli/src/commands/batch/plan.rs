@@ -238,7 +238,7 @@ fn check_arguments(job: &mut Job, args: &BatchArgs) -> Result<(), CliError> {
             (None, vec![calibrate.report.report, calibrate.report.figures])
         }
         Command::Filter(filter) => {
-            job.estimator = filter.estimate.estimator.chosen().map(|estimator| estimator.0);
+            job.estimator = filter.estimate.estimator.chosen();
             if filter.save_state.is_some() || filter.resume.is_some() {
                 let what = "--save-state and --resume are of one stream: use `ohmstrain filter` without batch";
                 return Err(CliError::Arguments(what.into()));
@@ -246,7 +246,7 @@ fn check_arguments(job: &mut Job, args: &BatchArgs) -> Result<(), CliError> {
             (filter.written.output, vec![])
         }
         Command::Smooth(smooth) => {
-            job.estimator = smooth.estimate.estimator.chosen().map(|estimator| estimator.0);
+            job.estimator = smooth.estimate.estimator.chosen();
             (smooth.written.output, vec![])
         }
         Command::Evaluate(evaluate) => {

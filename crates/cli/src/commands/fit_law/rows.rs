@@ -44,15 +44,15 @@ impl Cell {
         }
     }
 
-    /// Formats value and standard error with all digits.
-    fn csv(&self, has_error: bool) -> String {
-        let value = match self {
-            Self::Text(text) => quoted(text),
-            Self::Estimate(value, error) => return format!("{value},{error}"),
-            Self::AtLimit(value) | Self::Number(value, _) => value.to_string(),
-            Self::NotIdentified | Self::Nothing => String::new(),
+    /// Formats the value, and the standard error after it, with all digits.
+    fn csv(&self, has_error: bool) -> impl Iterator<Item = String> {
+        let (value, error) = match self {
+            Self::Text(text) => (text.clone(), String::new()),
+            Self::Estimate(value, error) => (value.to_string(), error.to_string()),
+            Self::AtLimit(value) | Self::Number(value, _) => (value.to_string(), String::new()),
+            Self::NotIdentified | Self::Nothing => (String::new(), String::new()),
         };
-        if has_error { value + "," } else { value }
+        std::iter::once(value).chain(has_error.then_some(error))
     }
 }
 
@@ -75,7 +75,10 @@ impl LawTable {
     pub fn print(&self, format: TableFormat) -> Result<(), CliError> {
         match format {
             TableFormat::Text => print(|out| Ok(out.write_all(self.text().as_bytes())?)),
-            TableFormat::Csv => print_data(self.csv().as_bytes()),
+            TableFormat::Csv => {
+                let failed = |error| CliError::Other(format!("cannot write CSV: {error}"));
+                print_data(&self.csv().map_err(failed)?)
+            }
             TableFormat::Latex => print_data(self.latex().as_bytes()),
         }
     }
@@ -126,19 +129,19 @@ impl LawTable {
     }
 
     /// Formats the table as CSV, with a column of standard errors after each parameter.
-    fn csv(&self) -> String {
+    fn csv(&self) -> Result<Vec<u8>, csv::Error> {
         let is_estimate = |row: &Vec<Cell>, column: usize| matches!(row.get(column), Some(Cell::Estimate(..)));
         let has_error = |column: usize| self.rows.iter().any(|row| is_estimate(row, column));
-        let name = |(column, name): (usize, &String)| match has_error(column) {
-            true => format!("{},{}", quoted(name), quoted(&format!("standard error of {name}"))),
-            false => quoted(name),
+        let names = |(column, name): (usize, &String)| {
+            let error = has_error(column).then(|| format!("standard error of {name}"));
+            std::iter::once(name.clone()).chain(error)
         };
-        let mut text = self.header.iter().enumerate().map(name).collect::<Vec<_>>().join(",") + "\n";
+        let mut out = csv::Writer::from_writer(Vec::new());
+        out.write_record(self.header.iter().enumerate().flat_map(names))?;
         for row in &self.rows {
-            let cells = row.iter().enumerate().map(|(column, cell)| cell.csv(has_error(column)));
-            text += &(cells.collect::<Vec<_>>().join(",") + "\n");
+            out.write_record(row.iter().enumerate().flat_map(|(column, cell)| cell.csv(has_error(column))))?;
         }
-        text
+        out.into_inner().map_err(|failed| failed.into_error().into())
     }
 
     /// Formats the table as a LaTeX `tabular` with the rules of the package booktabs.
@@ -155,10 +158,6 @@ impl LawTable {
         }
         text + "\\bottomrule\n\\end{tabular}\n"
     }
-}
-
-fn quoted(text: &str) -> String {
-    if text.contains([',', '"', '\n']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.into() }
 }
 
 /// Superscripts and their replacements.
@@ -211,7 +210,7 @@ mod tests {
             vec![Cell::from("d".to_string()), Cell::Number(-1.5e-7, "−1.5·10⁻⁷".into())],
         ];
         let table = LawTable { keys: 1, header, rows };
-        let csv = table.csv();
+        let csv = String::from_utf8(table.csv().unwrap()).unwrap();
         let lines: Vec<&str> = csv.lines().collect();
         assert_eq!(lines[0], "segment,\"tau_0, s\",\"standard error of tau_0, s\"");
         assert_eq!(lines[1..], ["\"a, b\",-0.00000000123456789,0.0000000001", "c_1,,", "d,-0.00000015,"]);

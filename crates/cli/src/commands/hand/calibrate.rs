@@ -8,6 +8,7 @@ use ohmstrain::{Calibrated, Fused, MADE_BY, Recording, fuse};
 use ohmstrain_calib::Samples;
 use serde::Serialize;
 
+use super::refuse_flags;
 use super::scores::{self, ChannelScores, JointScores};
 use crate::args::CalibrateArgs;
 use crate::channels::{Channel, Table, reference};
@@ -47,7 +48,19 @@ struct Group {
 
 /// Calibrates every channel, fuses those of one joint, and writes the description of all.
 pub fn run(args: &CalibrateArgs, tables: &[Table], messages: &Messages) -> Result<(), CliError> {
-    refuse_flags(args)?;
+    refuse_flags(
+        [
+            ("--report", args.report.report.is_some()),
+            ("--figures", args.report.figures.is_some()),
+            ("--explain", args.explain),
+            ("--bootstrap", args.bootstrap.is_some()),
+            ("--marks", !args.marks.is_empty()),
+            ("--align", args.align),
+            ("--prior", args.prior.is_some()),
+            ("--temperature", args.temperature.is_some()),
+        ],
+        OF_ONE_CHANNEL,
+    )?;
     let stem = args.output.file_stem().map_or_else(|| "hand".into(), |stem| stem.to_string_lossy().into_owned());
     let groups = groups(tables, &stem)?;
     let mut outputs = Outputs::new(args.replace.force, &args.traces);
@@ -73,25 +86,9 @@ pub fn run(args: &CalibrateArgs, tables: &[Table], messages: &Messages) -> Resul
     print(|out| scores::write(out, &heading, &scored, args.json))
 }
 
-/// Refuses flags that apply to one channel only.
-fn refuse_flags(args: &CalibrateArgs) -> Result<(), CliError> {
-    let flags = [
-        ("--report", args.report.report.is_some()),
-        ("--figures", args.report.figures.is_some()),
-        ("--explain", args.explain),
-        ("--bootstrap", args.bootstrap.is_some()),
-        ("--marks", !args.marks.is_empty()),
-        ("--align", args.align),
-        ("--prior", args.prior.is_some()),
-        ("--temperature", args.temperature.is_some()),
-    ];
-    match flags.iter().find(|(_, is_set)| *is_set) {
-        Some((flag, _)) => Err(CliError::Arguments(format!(
-            "{flag} is for recordings of one channel, and these have a column of readings for each of several"
-        ))),
-        None => Ok(()),
-    }
-}
+/// Reason to refuse a flag.
+const OF_ONE_CHANNEL: &str =
+    "is for recordings of one channel, and these have a column of readings for each of several";
 
 /// Groups channels by their common reference. A reference with a name of its own names the joint; one for all channels takes
 /// the name of the output.

@@ -4,15 +4,16 @@ use ohmstrain_report::Scored;
 use std::path::Path;
 
 use ohmstrain::trace::{HandChannel, TraceFile};
-use ohmstrain::{Error, Reading, ScoredRow, StepError, score};
+use ohmstrain::{Error, Reading, StepError};
 use ohmstrain_bench_data::Metadata;
 
 use super::description;
 use super::joint::{Channel, Joint, JointRow};
 use super::scores::{ChannelScores, JointScores};
-use super::{joints, refuse_flags};
+use super::{OF_ONE_SENSOR, joints, refuse_flags};
 use crate::args::{Estimators, EvaluateArgs};
 use crate::channels::{self, Table};
+use crate::commands::scoring;
 use crate::error::CliError;
 
 /// Scores every recording with the joints of a description, and passes its name and the scores to `show`.
@@ -21,15 +22,18 @@ pub fn run(
     hand: &Path,
     mut show: impl FnMut(&str, &[JointScores]) -> Result<(), CliError>,
 ) -> Result<(), CliError> {
-    refuse_flags([
-        ("--estimator", !matches!(args.estimator, Estimators::Auto)),
-        ("--without", args.without.is_some()),
-        ("--report", args.report.report.is_some()),
-        ("--figures", args.report.figures.is_some()),
-        ("--rest-resistance", args.rest_resistance.is_some()),
-        ("--known-every", args.known_every.is_some()),
-        ("--check", args.check),
-    ])?;
+    refuse_flags(
+        [
+            ("--estimator", !matches!(args.estimator, Estimators::Auto)),
+            ("--without", args.without.is_some()),
+            ("--report", args.report.report.is_some()),
+            ("--figures", args.report.figures.is_some()),
+            ("--rest-resistance", args.rest_resistance.is_some()),
+            ("--known-every", args.known_every.is_some()),
+            ("--check", args.check),
+        ],
+        OF_ONE_SENSOR,
+    )?;
     let description = description::read(hand)?;
     for path in &args.traces {
         let Some(table) = Table::read(path)? else {
@@ -76,12 +80,11 @@ pub fn scored(mut joint: Joint, table: &Table, overrides: &Metadata, part: Score
         smoothed => smoothed?,
     };
     let score = |rows: &[JointRow], of: &dyn Fn(&JointRow) -> (f64, f64)| {
-        let judged = |(k, row): (usize, &JointRow)| {
-            let (strain, sd) = of(row);
-            let (time_s, truth) = (time_s[k], traces[0].truth(k));
-            part.holds(time_s).then_some(ScoredRow { time_s, truth, strain, sd: Some(sd) })
+        let estimate = |row: usize| {
+            let (strain, sd) = of(&rows[row]);
+            (strain, Some(sd))
         };
-        score(&rows.iter().enumerate().filter_map(judged).collect::<Vec<_>>())
+        if rows.is_empty() { None } else { scoring::scores(&traces[0], part, estimate) }
     };
     let of_joint = |row: &JointRow| (row.strain, row.strain_sd);
     let of_channel = |(k, channel): (usize, &Channel)| {

@@ -9,7 +9,7 @@ use ohmstrain_model::SensorSide;
 
 use super::description;
 use super::joint::Joint;
-use super::{joints, refuse_flags};
+use super::{OF_ONE_SENSOR, joints, refuse_flags};
 use crate::args::ExportArgs;
 use crate::commands::export::put;
 use crate::commands::export_choice::usual_step_s;
@@ -18,12 +18,15 @@ use crate::output::{Outputs, print};
 
 /// Writes a filter for each channel, their fusion, and what calls them.
 pub fn run(args: &ExportArgs, hand: &Path) -> Result<(), CliError> {
-    refuse_flags([
-        ("--target rust", ExportTarget::from(args.target) == ExportTarget::Rust),
-        ("--estimator", args.estimator.chosen().is_some()),
-        ("--budget", args.budget.is_some()),
-        ("--score", args.score.is_some()),
-    ])?;
+    refuse_flags(
+        [
+            ("--target rust", ExportTarget::from(args.target) == ExportTarget::Rust),
+            ("--estimator", args.estimator.chosen().is_some()),
+            ("--budget", args.budget.is_some()),
+            ("--score", args.score.is_some()),
+        ],
+        OF_ONE_SENSOR,
+    )?;
     let description = description::read(hand)?;
     let joints = joints(&description, hand, "")?;
     let refused = |error| CliError::export(&error, &hand.display().to_string());

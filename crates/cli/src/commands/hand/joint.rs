@@ -7,6 +7,7 @@ use ohmstrain::{
 };
 use ohmstrain_bench_data::{LineParser, Metadata};
 
+use crate::channels::masked;
 use crate::error::CliError;
 use crate::sensor_file;
 use crate::suits::FIRST_LIVE_READINGS;
@@ -236,12 +237,11 @@ impl<'a> Channel<'a> {
             ));
         }
         let own = if self.entry.front_end.is_some() { "adc" } else { reading_column(expected) };
-        let cell = |name: &str| match name.trim() {
-            name if name == column => own.to_owned(),
-            name @ ("time_s" | "time_us") => name.to_owned(),
-            _ => "_".to_owned(),
-        };
-        Ok(header.split(',').map(cell).collect::<Vec<_>>().join(","))
+        Ok(masked(header.split(',').map(str::trim), |_, name| match name {
+            name if name == column => Some(own),
+            "time_s" | "time_us" => Some(name),
+            _ => None,
+        }))
     }
 
     /// Returns the unit of the readings according to the electronics, the lines above the header or the ending of the column's

@@ -49,26 +49,32 @@ pub fn joints<'d>(description: &'d HandDescription, hand: &Path, file: &str) -> 
     description.joints.iter().map(|joint| Joint::new(joint, folder, file)).collect()
 }
 
-/// Refuses flags that are for one sensor.
-pub fn refuse_flags<'f>(flags: impl IntoIterator<Item = (&'f str, bool)>) -> Result<(), CliError> {
+/// Reason to refuse a flag.
+pub const OF_ONE_SENSOR: &str = "is for one sensor, not for a hand.toml";
+
+/// Refuses flags that are set, for a reason.
+pub fn refuse_flags<'f>(flags: impl IntoIterator<Item = (&'f str, bool)>, why: &str) -> Result<(), CliError> {
     match flags.into_iter().find(|(_, is_set)| *is_set) {
-        Some((flag, _)) => Err(CliError::Arguments(format!("{flag} is for one sensor, not for a hand.toml"))),
+        Some((flag, _)) => Err(CliError::Arguments(format!("{flag} {why}"))),
         None => Ok(()),
     }
 }
 
 /// Refuses flags of an estimate that are for one sensor.
 pub fn refuse_estimate(args: &EstimateArgs) -> Result<(), CliError> {
-    refuse_flags([
-        ("--estimator", args.estimator.chosen().is_some()),
-        ("--initial-strain", args.initial_strain.is_some()),
-        ("--known", !args.known.is_empty()),
-        ("--rest-resistance", args.rest_resistance.is_some()),
-        ("--gate", args.gate.is_some()),
-        ("--influence", args.influence.is_some()),
-        ("--without", !args.without.is_empty()),
-        ("--unit", !args.units.units.is_empty()),
-    ])
+    refuse_flags(
+        [
+            ("--estimator", args.estimator.chosen().is_some()),
+            ("--initial-strain", args.initial_strain.is_some()),
+            ("--known", !args.known.is_empty()),
+            ("--rest-resistance", args.rest_resistance.is_some()),
+            ("--gate", args.gate.is_some()),
+            ("--influence", args.influence.is_some()),
+            ("--without", !args.without.is_empty()),
+            ("--unit", !args.units.units.is_empty()),
+        ],
+        OF_ONE_SENSOR,
+    )
 }
 
 /// Returns the columns of the output.

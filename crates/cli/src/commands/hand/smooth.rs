@@ -6,7 +6,7 @@ use ohmstrain_bench_data::RowWriter;
 use super::description;
 use super::joint::JointRow;
 use super::lines::{HandLines, HandParser, channels};
-use super::{columns, doubt, header, joints, refuse_estimate, refuse_flags, write};
+use super::{OF_ONE_SENSOR, columns, doubt, header, joints, refuse_estimate, refuse_flags, write};
 use crate::args::{Format, SmoothArgs};
 use crate::error::CliError;
 use crate::messages::Messages;
@@ -20,7 +20,7 @@ pub fn run(args: &SmoothArgs, messages: &Messages) -> Result<u64, CliError> {
     let (hand, written) = (&args.estimate.sensor, &args.written);
     refuse_estimate(&args.estimate)?;
     let parquet = written.format() == Format::Parquet;
-    refuse_flags([("--columns", !written.columns.is_empty()), ("--format parquet", parquet)])?;
+    refuse_flags([("--columns", !written.columns.is_empty()), ("--format parquet", parquet)], OF_ONE_SENSOR)?;
     let description = description::read(hand)?;
     let mut lines = HandLines::open(&args.trace_file, HandParser::new(false, LATE))?;
     let mut joints = joints(&description, hand, &lines.file)?;

@@ -1,6 +1,5 @@
 //! State of the view of several joints: their filters, and the lines so far.
 
-use std::collections::VecDeque;
 use std::io;
 use std::time::Instant;
 
@@ -8,14 +7,14 @@ use ohmstrain::trace::HandDescription;
 use ohmstrain_bench_data::{Metadata, Row};
 use ratatui::Frame;
 
-use super::pulse::{Counts, Pulse};
-use super::recorder::{self, Recorder};
-use super::session::{LEAST_AT_REST, MOST_POINTS, REST_S, recorded};
+use super::recorder::Recorder;
+use super::session::recorded;
+use super::track::{LEAST_AT_REST, REST_S, Timed, Track};
 use super::{Shown, hand_view};
 use crate::args::LiveArgs;
 use crate::commands::hand::joint::{Channel, Joint, JointRow};
 use crate::commands::hand::lines::{HandParser, channels};
-use crate::commands::hand::{joints, refuse_estimate, refuse_flags, step};
+use crate::commands::hand::{OF_ONE_SENSOR, joints, refuse_estimate, refuse_flags, step};
 use crate::error::CliError;
 use crate::port::{Due, Headed, Taker};
 use crate::run::median;
@@ -29,22 +28,21 @@ pub struct HandPoint {
     pub values: Vec<f64>,
 }
 
+impl Timed for HandPoint {
+    fn time_s(&self) -> f64 {
+        self.time_s
+    }
+}
+
 /// Filters of all joints on a stream of lines.
 pub struct HandSession<'a> {
     pub args: &'a LiveArgs,
     pub joints: Vec<Joint<'a>>,
     parser: HandParser,
     headed: Headed,
-    new_mark: Option<u32>,
-    pub points: VecDeque<HandPoint>,
-    /// Times of the marks, s.
-    pub marks: VecDeque<f64>,
+    pub track: Track<HandPoint>,
     /// Estimate of each joint in the last row.
     pub last: Vec<JointRow>,
-    pub pulse: Pulse,
-    pub recorder: Option<Recorder>,
-    /// Last message.
-    pub message: String,
 }
 
 impl<'a> HandSession<'a> {
@@ -54,74 +52,42 @@ impl<'a> HandSession<'a> {
     /// If a file cannot be read, the header lacks a column, or a flag is for one sensor.
     pub fn new(args: &'a LiveArgs, description: &'a HandDescription) -> Result<Self, CliError> {
         refuse_estimate(&args.estimate)?;
-        refuse_flags([
-            ("--gauge-length-mm", args.setup.gauge_length_mm.is_some()),
-            ("--front-end", args.setup.front_end.is_some()),
-            ("--joint", args.setup.joint.is_some()),
-        ])?;
+        refuse_flags(
+            [
+                ("--gauge-length-mm", args.setup.gauge_length_mm.is_some()),
+                ("--front-end", args.setup.front_end.is_some()),
+                ("--joint", args.setup.joint.is_some()),
+            ],
+            OF_ONE_SENSOR,
+        )?;
         let mut joints = joints(description, &args.estimate.sensor, &args.port.source())?;
         let (mut parser, headed) = (HandParser::new(true, ""), Headed::new(args.port.header.as_deref()));
         if let Some(header) = headed.header() {
             let refused = parser.take(header.as_bytes(), "--header", &mut joints)?.refused;
             refused.map_or(Ok(()), |refused| Err(CliError::Arguments(refused)))?;
         }
-        Ok(Self {
-            args,
-            joints,
-            parser,
-            headed,
-            new_mark: None,
-            points: VecDeque::new(),
-            marks: VecDeque::new(),
-            last: Vec::new(),
-            pulse: Pulse::default(),
-            recorder: None,
-            message: String::new(),
-        })
+        Ok(Self { args, joints, parser, headed, track: Track::new(), last: Vec::new() })
     }
 
     /// Restarts everything that depends on time, after the clock has restarted.
     fn restart(&mut self) -> Result<(), CliError> {
-        self.pulse.counts.restarts += 1;
+        self.track.pulse.counts.restarts += 1;
         self.joints.iter_mut().try_for_each(Joint::restart)?;
-        self.pulse.restart();
-        self.points.clear();
-        self.marks.clear();
-        self.message = "the clock has started again, and so have the filters".into();
-        if self.recorder.is_some() {
-            self.toggle_record();
-            self.toggle_record();
-        }
+        self.restarted("the clock has started again, and so have the filters");
         Ok(())
     }
 
-    /// Begins a recording of all channels' readings, as codes where they are.
-    fn new_recorder(&self) -> io::Result<Recorder> {
-        let all = || self.joints.iter().flat_map(|joint| &joint.channels);
-        let metadata = all().next().map_or_else(Metadata::default, |channel| channel.lines.metadata());
-        // Electronics that differ are in hand.toml alone.
-        let spec = metadata.front_end.filter(|spec| all().all(|channel| channel.entry.front_end == Some(*spec)));
-        let metadata = Metadata { front_end: spec, ..metadata };
-        let columns: Vec<&str> = all().map(|channel| channel.entry.column.as_str()).collect();
-        Recorder::begin(&self.args.record, metadata, own(&columns).map(|place| columns[place]))
-    }
-
     fn record(&mut self, rows: &[Row]) {
-        let mark = self.new_mark.take();
-        let Some(recorder) = &mut self.recorder else { return };
         let all: Vec<&Channel> = self.joints.iter().flat_map(|joint| &joint.channels).collect();
         let columns: Vec<&str> = all.iter().map(|channel| channel.entry.column.as_str()).collect();
         let readings = own(&columns).map(|place| recorded(&rows[place], all[place].lines.has_codes()));
-        if let Err(error) = recorder.write(rows[0].time_s, readings, mark) {
-            self.message = format!("cannot record: {error}");
-            self.recorder = None;
-        }
+        self.track.record(rows[0].time_s, readings);
     }
 
     /// Returns the median of a channel's readings in the last second, or of the last few; `None` if it is not read now.
     fn rested(&self, channel: usize) -> Option<f64> {
-        let last_s = self.points.back().filter(|last| last.readings[channel].is_finite())?.time_s;
-        let known = || self.points.iter().rev().filter(|point| point.readings[channel].is_finite());
+        let last_s = self.track.points.back().filter(|last| last.readings[channel].is_finite())?.time_s;
+        let known = || self.track.points.iter().rev().filter(|point| point.readings[channel].is_finite());
         let recent: Vec<f64> =
             known().take_while(|point| point.time_s >= last_s - REST_S).map(|point| point.readings[channel]).collect();
         let few = || known().take(LEAST_AT_REST).map(|point| point.readings[channel]).collect();
@@ -141,12 +107,11 @@ impl Taker for HandSession<'_> {
         let line = self.headed.line(line, arrived);
         let taken = self.parser.take(&line, &self.args.port.source(), &mut self.joints)?;
         if let Some(refused) = taken.refused {
-            self.pulse.counts.bad_lines += 1;
-            self.message = format!("skipped {refused}");
+            self.track.skip(format!("skipped {refused}"));
         }
         let Some(first) = taken.rows.first() else {
             // A header that comes again is a device that has restarted.
-            if taken.restarted && self.pulse.counts.rows > 0 {
+            if taken.restarted && self.track.pulse.counts.rows > 0 {
                 self.restart()?;
             }
             return Ok(None);
@@ -162,36 +127,45 @@ impl Taker for HandSession<'_> {
         self.last = match step(&mut self.joints, &rows) {
             Ok(estimates) => estimates,
             Err(error) => {
-                self.pulse.counts.bad_lines += 1;
-                self.message = error.to_string();
+                self.track.skip(error.to_string());
                 return Ok(());
             }
         };
         let missing = rows.iter().filter(|row| !row.reading.value.is_finite()).count();
-        self.pulse.count(due.time_s, missing as u64);
+        self.track.pulse.count(due.time_s, missing as u64);
         let readings: Vec<f64> = rows.iter().map(|row| row.reading.value).collect();
         for (channel, reading) in channels(&mut self.joints).zip(&readings) {
-            channel.doubt(*reading).into_iter().for_each(|doubt| self.message = doubt);
+            channel.doubt(*reading).into_iter().for_each(|doubt| self.track.message = doubt);
         }
         let values = self.last.iter().map(|row| row.value).collect();
-        self.points.push_back(HandPoint { time_s: due.time_s, readings, values });
-        let oldest_s = due.time_s - self.args.window_s.max(REST_S);
-        while self.points.len() > MOST_POINTS || self.points.front().is_some_and(|point| point.time_s < oldest_s) {
-            self.points.pop_front();
-        }
-        while self.marks.front().is_some_and(|mark_s| *mark_s < oldest_s) {
-            self.marks.pop_front();
-        }
+        self.track.push(HandPoint { time_s: due.time_s, readings, values }, self.args.window_s);
         self.record(&rows);
         Ok(())
     }
 }
 
 impl Shown for HandSession<'_> {
+    type Point = HandPoint;
+
+    fn track(&mut self) -> &mut Track<HandPoint> {
+        &mut self.track
+    }
+
+    /// Begins a recording of all channels' readings, as codes where they are.
+    fn new_recorder(&self) -> io::Result<Recorder> {
+        let all = || self.joints.iter().flat_map(|joint| &joint.channels);
+        let metadata = all().next().map_or_else(Metadata::default, |channel| channel.lines.metadata());
+        // Electronics that differ are in hand.toml alone.
+        let spec = metadata.front_end.filter(|spec| all().all(|channel| channel.entry.front_end == Some(*spec)));
+        let metadata = Metadata { front_end: spec, ..metadata };
+        let columns: Vec<&str> = all().map(|channel| channel.entry.column.as_str()).collect();
+        Recorder::begin(&self.args.record, metadata, own(&columns).map(|place| columns[place]))
+    }
+
     /// Makes the readings R₀ of each channel, and the strains of their joints zero; a joint with a channel that is not read, or whose reading
     /// cannot be its R₀, stays as it was.
     fn zero(&mut self) -> Result<(), CliError> {
-        if self.points.is_empty() {
+        if self.track.points.is_empty() {
             return Ok(());
         }
         let count = channels(&mut self.joints).count();
@@ -211,35 +185,11 @@ impl Shown for HandSession<'_> {
             joint.start_at_zero()?;
         }
         let all = "R0 of each channel is its median of the last second";
-        self.message = if refused.is_empty() { all.into() } else { refused.join("; ") };
+        self.track.message = if refused.is_empty() { all.into() } else { refused.join("; ") };
         Ok(())
     }
 
-    fn mark(&mut self) {
-        let Some(last) = self.points.back() else { return };
-        self.pulse.counts.marks += 1;
-        self.new_mark = Some(self.pulse.counts.marks);
-        self.marks.push_back(last.time_s);
-        self.message = format!("mark {} at {:.2} s", self.pulse.counts.marks, last.time_s);
-    }
-
-    fn toggle_record(&mut self) {
-        let has_rows = self.pulse.counts.rows > 0;
-        (self.recorder, self.message) = recorder::toggled(self.recorder.take(), has_rows, || self.new_recorder());
-    }
-
-    fn draw(&self, frame: &mut Frame, status: &str) {
+    fn picture(&self, frame: &mut Frame, status: &str) {
         hand_view::draw(frame, self, status);
-    }
-
-    fn counts(&self) -> Counts {
-        self.pulse.counts
-    }
-
-    fn recording(&mut self) -> Option<String> {
-        self.recorder.is_some().then(|| {
-            self.toggle_record();
-            self.message.clone()
-        })
     }
 }

@@ -8,7 +8,8 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::GraphType;
 
 use super::hand_session::HandSession;
-use super::view::{Around, MOST_DRAWN, chart, dataset, of_stream};
+use super::view::{Around, MOST_DRAWN, of_stream};
+use crate::chart::{chart, dataset};
 use crate::printable::printable;
 
 /// Colours of the joints, in turn.
@@ -18,7 +19,7 @@ const NAME: usize = 11;
 
 /// Draws everything.
 pub fn draw(frame: &mut Frame, session: &HandSession, status: &str) {
-    let around = Around { args: session.args, status, message: &session.message };
+    let around = Around { args: session.args, status, message: &session.track.message };
     around.draw(frame, numbers(session), |frame, area| draw_plot(frame, session, area));
 }
 
@@ -32,21 +33,21 @@ fn colour(joint: usize) -> Color {
 }
 
 fn draw_plot(frame: &mut Frame, session: &HandSession, area: Rect) {
-    let every = session.points.len().div_ceil(MOST_DRAWN).max(1);
+    let every = session.track.points.len().div_ceil(MOST_DRAWN).max(1);
     let line = |joint: usize| -> Vec<(f64, f64)> {
         let factor = shown(session, joint).0;
-        session.points.iter().step_by(every).map(|point| (point.time_s, factor * point.values[joint])).collect()
+        session.track.points.iter().step_by(every).map(|point| (point.time_s, factor * point.values[joint])).collect()
     };
     let lines: Vec<Vec<(f64, f64)>> = (0..session.joints.len()).map(line).collect();
     let window_s = session.args.window_s;
-    let end_s = session.points.back().map_or(window_s, |point| point.time_s);
+    let end_s = session.track.points.back().map_or(window_s, |point| point.time_s);
     let x = [end_s - window_s, end_s];
     let all = || lines.iter().flatten().map(|point| point.1);
     let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
     // A hand at rest is not drawn as if it moved: the plot has at least ten degrees, or percent.
     let (middle, half) = if low <= high { (0.5 * (low + high), (0.55 * (high - low)).max(5.0)) } else { (0.0, 5.0) };
     let y = [middle - half, middle + half];
-    let marks: Vec<(f64, f64)> = session.marks.iter().map(|mark_s| (*mark_s, y[0])).collect();
+    let marks: Vec<(f64, f64)> = session.track.marks.iter().map(|mark_s| (*mark_s, y[0])).collect();
     let mut datasets = vec![dataset(&marks, Color::Yellow, GraphType::Scatter).marker(Marker::Block)];
     datasets.extend(lines.iter().enumerate().map(|(joint, line)| dataset(line, colour(joint), GraphType::Line)));
     let of_strain = session.joints.iter().filter(|joint| joint.is_strain()).count();
@@ -62,7 +63,7 @@ fn numbers(session: &HandSession) -> Vec<Line<'static>> {
     let mut lines = Vec::new();
     let named = |name: &str| Span::from(format!("{name:<NAME$}")).dim();
     // The numbers below are equally old.
-    if let Some(silent_s) = session.pulse.silent_s() {
+    if let Some(silent_s) = session.track.pulse.silent_s() {
         lines.push(Line::from(vec![named("silent"), format!("for {silent_s:.0} s").into()]));
     }
     if session.last.is_empty() {
@@ -74,7 +75,7 @@ fn numbers(session: &HandSession) -> Vec<Line<'static>> {
         let number = format!("{:.1} ± {:.1}{unit}", factor * row.value, factor * 1.96 * row.sd);
         lines.push(Line::from(vec![name.style(Style::default().fg(colour(joint))), number.into()]));
     }
-    of_stream(&session.pulse, session.recorder.as_ref(), &mut |name, text| {
+    of_stream(&session.track.pulse, session.track.recorder.as_ref(), &mut |name, text| {
         lines.push(Line::from(vec![named(name), text.into()]));
     });
     let flags: Vec<&str> = session.last.iter().flat_map(|row| &row.flags).map(String::as_str).collect();

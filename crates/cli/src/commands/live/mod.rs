@@ -8,14 +8,14 @@ mod hand_view;
 mod pulse;
 mod recorder;
 mod session;
+mod track;
 mod view;
 
 use std::io::{self, IsTerminal};
-use std::time::{Duration, Instant};
 
 use ohmstrain_bench_data::counted;
-use ratatui::crossterm::event::{self, Event as Input, KeyCode, KeyEventKind, KeyModifiers};
-use ratatui::{DefaultTerminal, Frame};
+use ratatui::Frame;
+use ratatui::crossterm::event::KeyCode;
 
 use crate::args::LiveArgs;
 use crate::commands::hand::description;
@@ -23,35 +23,78 @@ use crate::error::CliError;
 use crate::messages::Messages;
 use crate::output::refuse_stdout;
 use crate::port::{Feed, Taker};
+use crate::screen::{self, Screen};
 use crate::sensor_file;
 use hand_session::HandSession;
-use pulse::Counts;
+use recorder::Recorder;
 use session::Session;
-
-/// Longest wait for a key.
-const KEY_WAIT: Duration = Duration::from_millis(10);
-/// Time between two drawings.
-const FRAME: Duration = Duration::from_millis(50);
+use track::{Timed, Track};
 
 /// A stream that is shown.
 trait Shown: Taker {
+    /// A row of the plot.
+    type Point: Timed;
+
+    /// Returns the rows so far.
+    fn track(&mut self) -> &mut Track<Self::Point>;
+
+    /// Begins a recording.
+    ///
+    /// # Errors
+    /// If no file can be created.
+    fn new_recorder(&self) -> io::Result<Recorder>;
+
     /// Takes the sensors as rested now.
     fn zero(&mut self) -> Result<(), CliError>;
 
-    /// Starts or stops recording.
-    fn toggle_record(&mut self);
-
-    /// Puts a mark on the next row.
-    fn mark(&mut self);
-
     /// Draws the view; `status` is the state of the port.
-    fn draw(&self, frame: &mut Frame, status: &str);
+    fn picture(&self, frame: &mut Frame, status: &str);
 
-    /// Returns the counts of rows.
-    fn counts(&self) -> Counts;
+    /// Starts or stops recording.
+    fn toggle_record(&mut self) {
+        let has_rows = self.track().pulse.counts.rows > 0;
+        let recorder = self.track().recorder.take();
+        let (recorder, message) = recorder::toggled(recorder, has_rows, || self.new_recorder());
+        let track = self.track();
+        (track.recorder, track.message) = (recorder, message);
+    }
 
     /// Returns the last message if a recording is being written.
-    fn recording(&mut self) -> Option<String>;
+    fn recording(&mut self) -> Option<String> {
+        self.track().recorder.is_some().then(|| {
+            self.toggle_record();
+            self.track().message.clone()
+        })
+    }
+
+    /// Begins other rows, and another recording if there is one, after the clock has restarted.
+    fn restarted(&mut self, message: &str) {
+        self.track().clear(message);
+        if self.track().recorder.is_some() {
+            self.toggle_record();
+            self.toggle_record();
+        }
+    }
+}
+
+impl<S: Shown> Screen for S {
+    fn is_done(&mut self, _: bool) -> Result<bool, CliError> {
+        Ok(false)
+    }
+
+    fn draw(&self, frame: &mut Frame, status: &str) {
+        self.picture(frame, status);
+    }
+
+    fn key(&mut self, code: KeyCode) -> Result<(), CliError> {
+        match code {
+            KeyCode::Char('z') => self.zero()?,
+            KeyCode::Char('r') => self.toggle_record(),
+            KeyCode::Char('m') => self.track().mark(),
+            _ => {}
+        }
+        Ok(())
+    }
 }
 
 /// Shows strain until the user quits.
@@ -67,19 +110,16 @@ pub fn run(args: &LiveArgs, messages: &Messages) -> Result<(), CliError> {
         let description = description::read(&args.estimate.sensor)?;
         return watch(&mut HandSession::new(args, &description)?, args, messages);
     }
-    let kind = args.estimate.estimator.chosen().map(|estimator| estimator.0);
+    let kind = args.estimate.estimator.chosen();
     let sensor = sensor_file::read(&args.estimate.sensor, kind)?;
     watch(&mut Session::new(args, sensor)?, args, messages)
 }
 
 fn watch<S: Shown>(session: &mut S, args: &LiveArgs, messages: &Messages) -> Result<(), CliError> {
     let mut feed = Feed::open(&args.port)?;
-    let mut terminal =
-        ratatui::try_init().map_err(|error| CliError::Other(format!("cannot use the terminal: {error}")))?;
-    let shown = show(&mut feed, &mut terminal, session);
-    ratatui::restore();
+    let shown = screen::show(&mut feed, session);
     session.recording().iter().for_each(|message| messages.remark(message));
-    let counts = session.counts();
+    let counts = session.track().pulse.counts;
     messages.remark(&format!(
         "{}, {} missing, {}, {} skipped, {} of the clock",
         counted(counts.rows, "row"),
@@ -89,31 +129,4 @@ fn watch<S: Shown>(session: &mut S, args: &LiveArgs, messages: &Messages) -> Res
         counted(counts.restarts, "restart")
     ));
     shown
-}
-
-fn show<S: Shown>(feed: &mut Feed<S::Row>, terminal: &mut DefaultTerminal, session: &mut S) -> Result<(), CliError> {
-    let failed = |error: io::Error| CliError::Other(format!("cannot use the terminal: {error}"));
-    let mut drawn: Option<Instant> = None;
-    loop {
-        feed.take_rows(session)?;
-        if drawn.is_none_or(|drawn| drawn.elapsed() >= FRAME) {
-            terminal.draw(|frame| session.draw(frame, &feed.status)).map_err(failed)?;
-            drawn = Some(Instant::now());
-        }
-        if event::poll(KEY_WAIT).map_err(failed)? {
-            match event::read().map_err(failed)? {
-                Input::Key(key) if key.kind == KeyEventKind::Release => {}
-                Input::Key(key) => match key.code {
-                    KeyCode::Char('q') | KeyCode::Esc => return Ok(()),
-                    KeyCode::Char('c') if key.modifiers.contains(KeyModifiers::CONTROL) => return Ok(()),
-                    KeyCode::Char('z') => session.zero()?,
-                    KeyCode::Char('r') => session.toggle_record(),
-                    KeyCode::Char('m') => session.mark(),
-                    _ => {}
-                },
-                Input::Resize(..) => drawn = None,
-                _ => {}
-            }
-        }
-    }
 }

@@ -1,6 +1,5 @@
 //! State of the view: the filter, and the lines so far.
 
-use std::collections::VecDeque;
 use std::io;
 use std::time::Instant;
 
@@ -11,20 +10,14 @@ use ohmstrain::{Error, Estimate, Filter, QuietWatch, Sensor, Thermometer, Validi
 use ohmstrain_bench_data::{Line, LineParser, ReadingKind, ReferenceQuantity, Row};
 use ratatui::Frame;
 
-use super::pulse::{Counts, Pulse};
-use super::recorder::{self, Recorder};
+use super::recorder::Recorder;
+use super::track::{LEAST_AT_REST, REST_S, Timed, Track};
 use super::{Shown, view};
 use crate::args::{LiveArgs, RestResistance};
 use crate::error::CliError;
 use crate::port::{Due, Headed, Taker};
 use crate::run::{builder, builder_anew, median, of_first};
 use crate::suits::FIRST_LIVE_READINGS;
-
-/// Largest number of rows kept for the plot.
-pub const MOST_POINTS: usize = 1 << 16;
-/// Duration, s, over which the reading of the rested sensor is determined, and the smallest number of readings for that.
-pub const REST_S: f64 = 1.0;
-pub const LEAST_AT_REST: usize = 5;
 
 /// A row of the plot.
 #[derive(Clone, Copy)]
@@ -35,6 +28,12 @@ pub struct Point {
     /// Strain, and half its 95 % interval.
     pub strain: f64,
     pub half_width: f64,
+}
+
+impl Timed for Point {
+    fn time_s(&self) -> f64 {
+        self.time_s
+    }
 }
 
 /// A filter on a stream of lines.
@@ -55,15 +54,8 @@ pub struct Session<'a> {
     /// The first known readings.
     early: Vec<f64>,
     headed: Headed,
-    new_mark: Option<u32>,
-    pub points: VecDeque<Point>,
-    /// Times of the marks, s.
-    pub marks: VecDeque<f64>,
+    pub track: Track<Point>,
     pub last: Option<Estimate>,
-    pub pulse: Pulse,
-    pub recorder: Option<Recorder>,
-    /// Last message.
-    pub message: String,
 }
 
 impl<'a> Session<'a> {
@@ -96,13 +88,8 @@ impl<'a> Session<'a> {
             rest,
             early: vec![],
             headed: Headed::new(args.port.header.as_deref()),
-            new_mark: None,
-            points: VecDeque::new(),
-            marks: VecDeque::new(),
+            track: Track::new(),
             last: None,
-            pulse: Pulse::default(),
-            recorder: None,
-            message: String::new(),
         };
         session.begin()?;
         if let Some(header) = session.headed.header().map(str::to_owned) {
@@ -129,39 +116,33 @@ impl<'a> Session<'a> {
             self.calibrated = self.calibrated.clone().on_joint(joint)?;
         }
         // Messages about the lines above it no longer apply.
-        self.message.clear();
+        self.track.message.clear();
         self.sensor = self.calibrated.clone();
         if self.sensor.params().temperature.is_some() && !self.lines.has_temperature() {
-            self.message = "no column temperature_c: intervals are wider".into();
+            self.track.message = "no column temperature_c: intervals are wider".into();
             self.sensor = self.calibrated.clone().without_temperature();
         }
         self.thermometer = Thermometer::new(&self.sensor);
-        if self.pulse.counts.rows > 0 { self.restart() } else { Ok(self.begin()?) }
+        if self.track.pulse.counts.rows > 0 { self.restart() } else { Ok(self.begin()?) }
     }
 
     /// Starts a new filter.
     fn begin(&mut self) -> Result<(), Error> {
-        let anew = self.pulse.counts.restarts > 0;
+        let anew = self.track.pulse.counts.restarts > 0;
         let wanted = if anew { builder_anew } else { builder }(&self.sensor, &self.args.estimate);
         let known = if anew { &[] } else { self.args.estimate.known.as_slice() };
         self.filter = self.rest.map_or(wanted, |measured| wanted.rest_resistance(measured)).build()?;
         self.watch = ValidityWatch::new(&self.sensor, self.rest);
         self.quiet = QuietWatch::new(&self.sensor, self.rest, known);
-        self.pulse.restart();
+        self.track.pulse.restart();
         Ok(())
     }
 
     /// Restarts everything that depends on time, after the clock has restarted.
     fn restart(&mut self) -> Result<(), CliError> {
-        self.pulse.counts.restarts += 1;
+        self.track.pulse.counts.restarts += 1;
         self.begin()?;
-        self.points.clear();
-        self.marks.clear();
-        self.message = "the clock has started again, and so has the filter".into();
-        if self.recorder.is_some() {
-            self.toggle_record();
-            self.toggle_record();
-        }
+        self.restarted("the clock has started again, and so has the filter");
         Ok(())
     }
 
@@ -184,35 +165,15 @@ impl<'a> Session<'a> {
         if self.early.len() == wanted.max(FIRST_LIVE_READINGS)
             && let Err(doubt) = self.sensor.check_unit(self.early.iter().copied(), self.rest)
         {
-            self.message = doubt.text(CommandLine);
+            self.track.message = doubt.text(CommandLine);
         }
         Ok(())
     }
 
-    /// Begins a recording of the reading, as a code if it is one, and of the reference.
-    fn new_recorder(&self) -> io::Result<Recorder> {
-        let reading = match (self.lines.has_codes(), self.lines.reading_kind()) {
-            (true, _) => "adc",
-            (_, Some(ReadingKind::Ratio)) => "resistance_ratio",
-            _ => "resistance_ohm",
-        };
-        let reference = self.lines.reference_quantity().map(|quantity| match quantity {
-            ReferenceQuantity::Strain => "strain",
-            ReferenceQuantity::AngleDeg => "angle_deg",
-        });
-        let columns = std::iter::once(reading).chain(reference);
-        Recorder::begin(&self.args.record, self.lines.metadata(), columns)
-    }
-
     fn record(&mut self, row: &Row) {
-        let mark = self.new_mark.take();
-        let Some(recorder) = &mut self.recorder else { return };
         let reading = recorded(row, self.lines.has_codes());
         let reference = self.lines.reference_quantity().map(|_| row.reference);
-        if let Err(error) = recorder.write(row.time_s, std::iter::once(reading).chain(reference), mark) {
-            self.message = format!("cannot record: {error}");
-            self.recorder = None;
-        }
+        self.track.record(row.time_s, std::iter::once(reading).chain(reference));
     }
 }
 
@@ -232,10 +193,9 @@ impl Taker for Session<'_> {
             Ok(Line::Header) => self.headed().map(|()| None),
             Ok(_) => Ok(None),
             Err(fault) => {
-                self.pulse.counts.bad_lines += 1;
-                self.message = format!("skipped {fault}");
+                self.track.skip(format!("skipped {fault}"));
                 if self.lines.reading_kind().is_none() {
-                    self.message += "; a stream without a header needs --header time_s,resistance_ohm";
+                    self.track.message += "; a stream without a header needs --header time_s,resistance_ohm";
                 }
                 Ok(None)
             }
@@ -252,27 +212,20 @@ impl Taker for Session<'_> {
         let estimate = match self.filter.step(row.time_s, trace::reading(&row.reading)) {
             Ok(estimate) => estimate,
             Err(error) => {
-                self.pulse.counts.bad_lines += 1;
-                self.message = error.to_string();
+                self.track.skip(error.to_string());
                 return Ok(());
             }
         };
-        self.pulse.count(row.time_s, u64::from(!row.reading.value.is_finite()));
+        self.track.pulse.count(row.time_s, u64::from(!row.reading.value.is_finite()));
         let (reading, half_width) = (row.reading.value, 1.96 * estimate.strain_sd);
-        self.points.push_back(Point { time_s: row.time_s, reading, strain: estimate.strain, half_width });
-        let oldest_s = row.time_s - self.args.window_s.max(REST_S);
-        while self.points.len() > MOST_POINTS || self.points.front().is_some_and(|point| point.time_s < oldest_s) {
-            self.points.pop_front();
-        }
-        while self.marks.front().is_some_and(|mark_s| *mark_s < oldest_s) {
-            self.marks.pop_front();
-        }
+        let point = Point { time_s: row.time_s, reading, strain: estimate.strain, half_width };
+        self.track.push(point, self.args.window_s);
         if let Some(warning) = self.watch.see(row.time_s, reading, estimate.strain_rate, f64::NAN).last() {
-            self.message = warning.to_string();
+            self.track.message = warning.to_string();
         }
         if let Some(quiet) = self.quiet.see(&estimate) {
             let quiet_s = significant(quiet.now_s - quiet.from_s, 2);
-            self.message = format!("{quiet_s} s of quiet that may be a rest: z, if it is one");
+            self.track.message = format!("{quiet_s} s of quiet that may be a rest: z, if it is one");
         }
         self.last = Some(estimate);
         self.doubt_early(reading)?;
@@ -282,19 +235,40 @@ impl Taker for Session<'_> {
 }
 
 impl Shown for Session<'_> {
+    type Point = Point;
+
+    fn track(&mut self) -> &mut Track<Point> {
+        &mut self.track
+    }
+
+    /// Begins a recording of the reading, as a code if it is one, and of the reference.
+    fn new_recorder(&self) -> io::Result<Recorder> {
+        let reading = match (self.lines.has_codes(), self.lines.reading_kind()) {
+            (true, _) => "adc",
+            (_, Some(ReadingKind::Ratio)) => "resistance_ratio",
+            _ => "resistance_ohm",
+        };
+        let reference = self.lines.reference_quantity().map(|quantity| match quantity {
+            ReferenceQuantity::Strain => "strain",
+            ReferenceQuantity::AngleDeg => "angle_deg",
+        });
+        let columns = std::iter::once(reading).chain(reference);
+        Recorder::begin(&self.args.record, self.lines.metadata(), columns)
+    }
+
     /// Makes the reading R₀, and the strain zero.
     fn zero(&mut self) -> Result<(), CliError> {
-        let Some(last_s) = self.points.back().map(|point| point.time_s) else { return Ok(()) };
-        let recent = self.points.iter().rev().take_while(|point| point.time_s >= last_s - REST_S);
+        let Some(last_s) = self.track.points.back().map(|point| point.time_s) else { return Ok(()) };
+        let recent = self.track.points.iter().rev().take_while(|point| point.time_s >= last_s - REST_S);
         let mut readings: Vec<f64> = recent.map(|point| point.reading).filter(|reading| reading.is_finite()).collect();
         if readings.len() < LEAST_AT_REST {
-            let known = self.points.iter().rev().map(|point| point.reading).filter(|reading| reading.is_finite());
+            let known = self.track.points.iter().rev().map(|point| point.reading).filter(|reading| reading.is_finite());
             readings = known.take(LEAST_AT_REST).collect();
         }
         let count = readings.len();
         let Some(rest) = median(readings) else { return Ok(()) };
         if let Err(refused) = self.sensor.check_rest_resistance(rest) {
-            self.message = format!("R0 stays as it was: {refused}");
+            self.track.message = format!("R0 stays as it was: {refused}");
             return Ok(());
         }
         self.rest = Some(rest);
@@ -304,35 +278,11 @@ impl Shown for Session<'_> {
         let at_zero = wanted.initial_strain(0.0).build();
         let starts = if at_zero.is_ok() { "; it starts again at zero" } else { "" };
         self.filter = at_zero.unwrap_or(wanted.build()?);
-        self.message = format!("R0 is {} now, the median of {count} readings{starts}", significant(rest, 5));
+        self.track.message = format!("R0 is {} now, the median of {count} readings{starts}", significant(rest, 5));
         Ok(())
     }
 
-    fn mark(&mut self) {
-        let Some(last) = self.points.back() else { return };
-        self.pulse.counts.marks += 1;
-        self.new_mark = Some(self.pulse.counts.marks);
-        self.marks.push_back(last.time_s);
-        self.message = format!("mark {} at {:.2} s", self.pulse.counts.marks, last.time_s);
-    }
-
-    fn toggle_record(&mut self) {
-        let has_rows = self.pulse.counts.rows > 0;
-        (self.recorder, self.message) = recorder::toggled(self.recorder.take(), has_rows, || self.new_recorder());
-    }
-
-    fn draw(&self, frame: &mut Frame, status: &str) {
+    fn picture(&self, frame: &mut Frame, status: &str) {
         view::draw(frame, self, status, self.args);
-    }
-
-    fn counts(&self) -> Counts {
-        self.pulse.counts
-    }
-
-    fn recording(&mut self) -> Option<String> {
-        self.recorder.is_some().then(|| {
-            self.toggle_record();
-            self.message.clone()
-        })
     }
 }

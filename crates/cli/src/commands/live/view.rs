@@ -5,15 +5,16 @@ use ohmstrain::{Estimate, Quantity, ReadingUnit};
 use ohmstrain_bench_data::counted;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
-use ratatui::style::{Color, Style, Stylize};
+use ratatui::style::{Color, Stylize};
 use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
-use ratatui::widgets::{Axis, Block, Chart, Dataset, GraphType, Paragraph, Wrap};
+use ratatui::widgets::{Block, GraphType, Paragraph, Wrap};
 
 use super::pulse::Pulse;
 use super::recorder::Recorder;
 use super::session::Session;
 use crate::args::LiveArgs;
+use crate::chart::{chart, dataset};
 use crate::printable::printable;
 
 /// Width of the numbers in columns, and the smallest width of a plot beside them.
@@ -29,7 +30,7 @@ const BAR: usize = 10;
 
 /// Draws everything.
 pub fn draw(frame: &mut Frame, session: &Session, status: &str, args: &LiveArgs) {
-    let around = Around { args, status, message: &session.message };
+    let around = Around { args, status, message: &session.track.message };
     around.draw(frame, numbers(session), |frame, area| draw_plot(frame, session, args.window_s, area));
 }
 
@@ -69,18 +70,18 @@ impl Around<'_> {
 fn draw_plot(frame: &mut Frame, session: &Session, window_s: f64, area: Rect) {
     let (factor, unit) = shown(session.sensor().params().quantity);
     let limits = session.sensor().params().limits;
-    let every = session.points.len().div_ceil(MOST_DRAWN).max(1);
+    let every = session.track.points.len().div_ceil(MOST_DRAWN).max(1);
     let line = |offset: f64| -> Vec<(f64, f64)> {
-        let points = session.points.iter().step_by(every);
+        let points = session.track.points.iter().step_by(every);
         let inside = |x: f64| x.max(limits.lower).min(limits.upper);
         points.map(|p| (p.time_s, factor * inside(p.strain + offset * p.half_width))).collect()
     };
     let (mean, upper, lower) = (line(0.0), line(1.0), line(-1.0));
-    let end_s = session.points.back().map_or(window_s, |point| point.time_s);
+    let end_s = session.track.points.back().map_or(window_s, |point| point.time_s);
     let x = [end_s - window_s, end_s];
     let margin = 0.05 * limits.span();
     let y = [factor * (limits.lower - margin), factor * (limits.upper + margin)];
-    let marks: Vec<(f64, f64)> = session.marks.iter().map(|mark_s| (*mark_s, y[0])).collect();
+    let marks: Vec<(f64, f64)> = session.track.marks.iter().map(|mark_s| (*mark_s, y[0])).collect();
     let datasets = vec![
         dataset(&upper, Color::DarkGray, GraphType::Line),
         dataset(&lower, Color::DarkGray, GraphType::Line),
@@ -95,26 +96,12 @@ fn draw_plot(frame: &mut Frame, session: &Session, window_s: f64, area: Rect) {
     frame.render_widget(chart(datasets, title, x, y), area);
 }
 
-/// Returns a line, or dots, of a chart.
-pub fn dataset(data: &[(f64, f64)], colour: Color, kind: GraphType) -> Dataset<'_> {
-    Dataset::default().marker(Marker::Braille).graph_type(kind).style(Style::default().fg(colour)).data(data)
-}
-
-/// Returns a chart with these bounds.
-pub fn chart<'a>(datasets: Vec<Dataset<'a>>, title: String, x: [f64; 2], y: [f64; 2]) -> Chart<'a> {
-    let labels = |[low, high]: [f64; 2]| [low, 0.5 * (low + high), high].map(|x| Line::from(format!("{x:.1}")));
-    Chart::new(datasets)
-        .block(Block::bordered().title(title))
-        .x_axis(Axis::default().bounds(x).labels(labels(x)))
-        .y_axis(Axis::default().bounds(y).labels(labels(y)))
-}
-
 fn numbers(session: &Session) -> Vec<Line<'static>> {
     let mut lines = vec![];
     let mut line =
         |name: &str, text: String| lines.push(Line::from(vec![Span::from(format!("{name:<11}")).dim(), text.into()]));
     // The numbers below are equally old.
-    if let Some(silent_s) = session.pulse.silent_s() {
+    if let Some(silent_s) = session.track.pulse.silent_s() {
         line("silent", format!("for {silent_s:.0} s"));
     }
     if let Some(row) = &session.last {
@@ -122,7 +109,7 @@ fn numbers(session: &Session) -> Vec<Line<'static>> {
     } else {
         line("", "no reading yet".into());
     }
-    of_stream(&session.pulse, session.recorder.as_ref(), &mut line);
+    of_stream(&session.track.pulse, session.track.recorder.as_ref(), &mut line);
     lines
 }
 

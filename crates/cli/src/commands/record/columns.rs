@@ -3,11 +3,8 @@
 use ohmstrain_bench_data::pacing::{Pacing, Position};
 use ohmstrain_bench_data::{Line, LineParser, Metadata, ReferenceQuantity};
 
-use crate::channels::{self, ONE_CHANNEL};
+use crate::channels::{self, KEPT, ONE_CHANNEL};
 use crate::port::Due;
-
-/// Columns that contain no readings and are kept under their names.
-const KEPT: [&str; 2] = ["time_us", "temperature_c"];
 
 /// Lines of a stream: a parser for each column of readings.
 pub struct Columns {
@@ -60,13 +57,9 @@ impl Columns {
         }
         let (mut channels, mut headers) = (Vec::with_capacity(readings.len()), Vec::with_capacity(readings.len()));
         for (place, _, known) in &readings {
-            let kept = |name: &str| KEPT.contains(&name) || name == "time_s";
-            let masked = |(k, name): (usize, &String)| match k == *place {
-                true => (*known).to_owned(),
-                false if kept(name) => name.clone(),
-                false => "_".to_owned(),
-            };
-            let masked = names.iter().enumerate().map(masked).collect::<Vec<_>>().join(",");
+            let masked = channels::masked(names.iter().map(String::as_str), |k, name| {
+                if k == *place { Some(*known) } else { KEPT.contains(&name).then_some(name) }
+            });
             let mut lines = LineParser::new(name, overrides.clone());
             for remark in remarks {
                 // A remark without metadata is ignored, as in any stream.

@@ -10,10 +10,10 @@ mod view;
 mod writer;
 
 use std::io::{self, IsTerminal, Write};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use ratatui::DefaultTerminal;
-use ratatui::crossterm::event::{self, Event as Input, KeyCode, KeyEventKind, KeyModifiers};
+use ratatui::Frame;
+use ratatui::crossterm::event::KeyCode;
 
 use crate::args::RecordArgs;
 use crate::error::{CliError, shell_word};
@@ -21,15 +21,13 @@ use crate::messages::Messages;
 use crate::output::refuse_stdout;
 use crate::port::Feed;
 use crate::protocol_file;
+use crate::screen::{self, Screen};
 use columns::StreamRow;
 use pacer::Pacer;
 use recording::Recording;
 
-/// Longest wait for a key, or a line.
-const KEY_WAIT: Duration = Duration::from_millis(10);
+/// Longest wait for a line.
 const LINE_WAIT: Duration = Duration::from_millis(100);
-/// Time between two drawings.
-const FRAME: Duration = Duration::from_millis(50);
 
 /// Records until the protocol has been followed, the readings have ended, or the user leaves.
 pub fn run(args: &RecordArgs, messages: &Messages) -> Result<(), CliError> {
@@ -43,11 +41,7 @@ pub fn run(args: &RecordArgs, messages: &Messages) -> Result<(), CliError> {
     let mut feed = Feed::open(&args.port)?;
     let mut recording = Recording::new(args, Pacer::new(pacing))?;
     if is_terminal {
-        let failed = |error| CliError::Other(format!("cannot use the terminal: {error}"));
-        let mut terminal = ratatui::try_init().map_err(failed)?;
-        let shown = show(&mut feed, &mut terminal, &mut recording, args);
-        ratatui::restore();
-        shown?;
+        screen::show(&mut feed, &mut recording)?;
     } else {
         follow(&mut feed, &mut recording)?;
     }
@@ -97,46 +91,29 @@ fn follow(feed: &mut Feed<StreamRow>, recording: &mut Recording) -> Result<(), C
     }
 }
 
-/// Draws the protocol beside the readings, and handles keys.
-fn show(
-    feed: &mut Feed<StreamRow>,
-    terminal: &mut DefaultTerminal,
-    recording: &mut Recording,
-    args: &RecordArgs,
-) -> Result<(), CliError> {
-    let failed = |error: io::Error| CliError::Other(format!("cannot use the terminal: {error}"));
-    let mut drawn: Option<Instant> = None;
-    loop {
-        feed.take_rows(recording)?;
-        if args.bell && !recording.cues.is_empty() {
-            io::stdout().write_all(b"\x07").map_err(failed)?;
+impl Screen for Recording<'_> {
+    /// Rings for each step that has begun.
+    fn is_done(&mut self, feed_is_over: bool) -> Result<bool, CliError> {
+        if self.args.bell && !self.cues.is_empty() {
+            io::stdout().write_all(b"\x07").map_err(screen::failed)?;
         }
-        recording.cues.clear();
-        if recording.pacer.is_done() || (feed.has_ended && feed.is_empty()) {
-            return Ok(());
-        }
-        if drawn.is_none_or(|drawn| drawn.elapsed() >= FRAME) {
-            terminal.draw(|frame| view::draw(frame, recording, &feed.status, args)).map_err(failed)?;
-            drawn = Some(Instant::now());
-        }
-        if !event::poll(KEY_WAIT).map_err(failed)? {
-            continue;
-        }
-        let Input::Key(key) = event::read().map_err(failed)? else {
-            drawn = None;
-            continue;
-        };
-        if key.kind == KeyEventKind::Release {
-            continue;
-        }
-        match key.code {
-            KeyCode::Char('q') | KeyCode::Esc => return Ok(()),
-            KeyCode::Char('c') if key.modifiers.contains(KeyModifiers::CONTROL) => return Ok(()),
-            KeyCode::Char(digit @ '1'..='9') => recording.mark(digit as usize - '1' as usize)?,
-            _ if recording.pacer.is_marked() => recording.pacer.release(),
-            KeyCode::Char('b') => recording.repeat("spoiled")?,
-            KeyCode::Char(' ') => recording.toggle_pause()?,
+        self.cues.clear();
+        Ok(self.pacer.is_done() || feed_is_over)
+    }
+
+    /// Draws the protocol beside the readings.
+    fn draw(&self, frame: &mut Frame, status: &str) {
+        view::draw(frame, self, status);
+    }
+
+    fn key(&mut self, code: KeyCode) -> Result<(), CliError> {
+        match code {
+            KeyCode::Char(digit @ '1'..='9') => self.mark(digit as usize - '1' as usize)?,
+            _ if self.pacer.is_marked() => self.pacer.release(),
+            KeyCode::Char('b') => self.repeat("spoiled")?,
+            KeyCode::Char(' ') => self.toggle_pause()?,
             _ => {}
         }
+        Ok(())
     }
 }

@@ -44,7 +44,7 @@ pub struct Counts {
 
 /// A recording that is being made.
 pub struct Recording<'a> {
-    args: &'a RecordArgs,
+    pub args: &'a RecordArgs,
     name: String,
     overrides: Metadata,
     headed: Headed,
@@ -192,7 +192,7 @@ impl<'a> Recording<'a> {
         self.held = held;
     }
 
-    fn draw(&mut self, time_s: f64, reading: f64) {
+    fn plot(&mut self, time_s: f64, reading: f64) {
         let planned = self.pacer.planned(time_s).unwrap_or(f64::NAN);
         self.points.push_back(Point { time_s, reading, planned });
         let oldest_s = time_s - self.args.window_s;
@@ -269,7 +269,7 @@ impl Taker for Recording<'_> {
             self.writer.settle();
         }
         self.counts.rows += 1;
-        self.draw(time_s, due.row.reading);
+        self.plot(time_s, due.row.reading);
         Ok(())
     }
 }

@@ -7,11 +7,10 @@ use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Style, Stylize};
 use ratatui::symbols::Marker;
-use ratatui::text::Line;
-use ratatui::widgets::{Axis, Block, Chart, Dataset, Gauge, GraphType, Paragraph, Wrap};
+use ratatui::widgets::{Block, Gauge, GraphType, Paragraph, Wrap};
 
 use super::recording::{Point, Recording};
-use crate::args::RecordArgs;
+use crate::chart::{chart, dataset};
 use crate::printable::printable;
 
 /// Length of the plan ahead that is shown, s, and its number of points.
@@ -25,7 +24,8 @@ const PLOT_HEIGHT: u16 = 6;
 const BEATS_HZ: f64 = 1.0;
 
 /// Draws everything.
-pub fn draw(frame: &mut Frame, recording: &Recording, status: &str, args: &RecordArgs) {
+pub fn draw(frame: &mut Frame, recording: &Recording, status: &str) {
+    let args = recording.args;
     let rows = [
         Constraint::Length(1),
         Constraint::Length(3),
@@ -75,10 +75,6 @@ fn key_line(recording: &Recording) -> String {
     printable(&format!("b back, again   space pause   held at: {}   q quit", names.join(", "))).into_owned()
 }
 
-fn line<'a>(data: &'a [(f64, f64)], colour: Color) -> Dataset<'a> {
-    Dataset::default().marker(Marker::Braille).graph_type(GraphType::Line).style(Style::default().fg(colour)).data(data)
-}
-
 fn draw_plan(frame: &mut Frame, recording: &Recording, now_s: f64, area: Rect) {
     let pacing = recording.pacer.pacing();
     let (factor, unit) = shown(match pacing.quantity {
@@ -100,14 +96,13 @@ fn draw_plan(frame: &mut Frame, recording: &Recording, now_s: f64, area: Rect) {
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
     let margin = 0.1 * (high - low).max(f64::MIN_POSITIVE);
     let (x, y) = ([now_s - past_s, now_s + AHEAD_S], [low - margin, high + margin]);
-    let body = Dataset::default().marker(Marker::Block).graph_type(GraphType::Scatter);
     let datasets = vec![
-        line(&past, Color::DarkGray),
-        line(&ahead, Color::Cyan),
-        body.style(Style::default().fg(Color::Yellow)).data(&now),
+        dataset(&past, Color::DarkGray, GraphType::Line),
+        dataset(&ahead, Color::Cyan, GraphType::Line),
+        dataset(&now, Color::Yellow, GraphType::Scatter).marker(Marker::Block),
     ];
     let title = format!(" where the body should be,{unit}; time, s ");
-    frame.render_widget(chart(datasets, &title, x, y), area);
+    frame.render_widget(chart(datasets, title, x, y), area);
 }
 
 fn draw_readings(frame: &mut Frame, recording: &Recording, window_s: f64, area: Rect) {
@@ -119,22 +114,12 @@ fn draw_readings(frame: &mut Frame, recording: &Recording, window_s: f64, area: 
         if readings.is_empty() { (0.0, 1.0) } else { (of(f64::min, f64::INFINITY), of(f64::max, f64::NEG_INFINITY)) };
     let margin = (0.05 * (high - low)).max(1e-4 * high.abs()).max(f64::MIN_POSITIVE);
     let (x, y) = ([end_s - window_s, end_s], [low - margin, high + margin]);
-    frame.render_widget(chart(vec![line(&readings, Color::Green)], " readings; time, s ", x, y), area);
+    let datasets = vec![dataset(&readings, Color::Green, GraphType::Line)];
+    frame.render_widget(chart(datasets, " readings; time, s ".into(), x, y), area);
 }
 
 /// Returns a selection of the recorded points, enough for a wide terminal.
 fn drawn(recording: &Recording, value: impl Fn(&Point) -> f64) -> Vec<(f64, f64)> {
     let every = recording.points.len().div_ceil(MOST_DRAWN).max(1);
     recording.points.iter().step_by(every).map(|point| (point.time_s, value(point))).collect()
-}
-
-fn chart<'a>(datasets: Vec<Dataset<'a>>, title: &str, x: [f64; 2], y: [f64; 2]) -> Chart<'a> {
-    let labels = |[low, high]: [f64; 2]| {
-        let digits = if high - low < 1.0 { 3 } else { 1 };
-        [low, 0.5 * (low + high), high].map(|x| Line::from(format!("{x:.digits$}")))
-    };
-    Chart::new(datasets)
-        .block(Block::bordered().title(title.to_owned()))
-        .x_axis(Axis::default().bounds(x).labels(labels(x)))
-        .y_axis(Axis::default().bounds(y).labels(labels(y)))
 }

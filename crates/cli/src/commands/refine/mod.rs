@@ -26,8 +26,7 @@ const TRUST: &str = "the likelihood of readings trusts the law: where the law is
 
 /// Refines a sensor's noise on a recording and writes its parameters.
 pub fn run(args: &RefineArgs, messages: &Messages) -> Result<(), CliError> {
-    if let Some(other) = args.estimator.chosen().map(|estimator| estimator.0).filter(|kind| *kind != EstimatorKind::Ekf)
-    {
+    if let Some(other) = args.estimator.chosen().filter(|kind| *kind != EstimatorKind::Ekf) {
         let name = other.name();
         return Err(CliError::Arguments(format!("--estimator: expected ekf, the only one to refine, found {name}")));
     }

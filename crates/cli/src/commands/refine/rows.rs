@@ -30,15 +30,11 @@ impl RelativeRows {
         until: Option<f64>,
         rest_reading: f64,
     ) -> Result<Self, CliError> {
-        let mut trace = recording.trace.until(until.unwrap_or(f64::INFINITY));
-        if let Some(from) = from {
-            trace = trace.since(from);
-        }
-        if trace.is_empty() {
+        let rows = recording.rows(recording.between(from, until));
+        if rows.trace.is_empty() {
             return Err(recording.no_rows(from, until).into());
         }
-        let stride = trace.len().div_ceil(MOST_ROWS).max(1);
-        let rows = TraceFile { trace, ..recording.rows(0..0) };
+        let stride = rows.trace.len().div_ceil(MOST_ROWS).max(1);
         let relative = |row: usize| rows.reading(row).1.relative(rest_reading);
         let readings: Vec<_> = (0..rows.trace.len()).step_by(stride).map(relative).collect();
         let known = readings.iter().flatten().count();

@@ -21,22 +21,7 @@ static const char *const COLUMN[OHMSTRAIN_CHANNELS] = {
 };
 
 /* Cuts the next cell off a line; null at the end. */
-static char *next_cell(char **line)
-{
-    char *cell = *line, *end;
-
-    if (!cell) {
-        return cell;
-    }
-    cell += strspn(cell, " \t");
-    end = cell + strcspn(cell, ",\r\n");
-    *line = *end == ',' ? end + 1 : (char *)0;
-    while (end > cell && (end[-1] == ' ' || end[-1] == '\t')) {
-        end--;
-    }
-    *end = 0;
-    return cell;
-}
+{% include "cells.c" %}
 
 int main(void)
 {

@@ -2,7 +2,7 @@ use std::ops::Range;
 
 use ohmstrain_ekf::correction::{FILTER_INPUTS, INDUCING, OUTPUTS};
 
-use super::table::{AMOUNT, FACTOR, FieldError, POSITIVE, SIGNED, Table, WEIGHT};
+use super::table::{AMOUNT, FACTOR, FieldError, POSITIVE, SIGNED, Table, WEIGHT, check};
 use crate::correction::side_of;
 use crate::params::correction::{
     CorrectionParams, CorrectionScale, CorrectorParams, InputScales, ProcessParams, SIDES, SMOOTHER_INPUTS,
@@ -35,9 +35,7 @@ fn count(table: &Table, rows: usize) -> Result<(), FieldError> {
 
 impl SimulatedParams {
     fn validate(&self, table: &Table) -> Result<(), FieldError> {
-        table.number("mean", self.mean, SIGNED)?;
-        table.number("sd", self.sd, POSITIVE)?;
-        table.number("length", self.length, FACTOR)?;
+        check!(table, self; mean: SIGNED, sd: POSITIVE, length: FACTOR)?;
         count(table, self.rows.len())?;
         table.length("weights", self.rows.len(), self.weights.len())?;
         table.numbers("weights", &self.weights, WEIGHT)?;
@@ -51,8 +49,7 @@ impl CorrectionScale {
     /// # Errors
     /// Names the first number outside its range.
     pub fn validate(&self, table: &Table) -> Result<(), FieldError> {
-        table.number("centre", self.centre, SIGNED)?;
-        table.number("half_range", self.half_range, POSITIVE)?;
+        check!(table, self; centre: SIGNED, half_range: POSITIVE)?;
         table.numbers("rates", &self.rates, POSITIVE)?;
         table.numbers("starts", self.starts.as_flattened(), SIGNED)
     }
@@ -61,8 +58,7 @@ impl CorrectionScale {
 impl CorrectorParams {
     /// Checks a corrector with that number of inputs.
     fn validate(&self, table: &Table, inputs: usize, rows: usize) -> Result<(), FieldError> {
-        table.number("sd_scale", self.sd_scale, FACTOR)?;
-        table.number("strain_sd", self.strain_sd, POSITIVE)?;
+        check!(table, self; sd_scale: FACTOR, strain_sd: POSITIVE)?;
         table.length("order", rows, self.order.len())?;
         let mut missing = vec![true; rows];
         for (index, row) in self.order.iter().enumerate() {
@@ -107,11 +103,7 @@ impl ProcessParams {
         (inputs, first): (Range<usize>, Option<usize>),
         rows: usize,
     ) -> Result<(), FieldError> {
-        table.number("sd_scale", self.sd_scale, FACTOR)?;
-        table.number("mean", self.mean, SIGNED)?;
-        table.number("sd", self.sd, AMOUNT)?;
-        table.number("least_sd", self.least_sd, AMOUNT)?;
-        table.number("noise_sd", self.noise_sd, AMOUNT)?;
+        check!(table, self; sd_scale: FACTOR, mean: SIGNED, sd: AMOUNT, least_sd: AMOUNT, noise_sd: AMOUNT)?;
         let mut missing = vec![true; inputs.end];
         for (index, input) in self.inputs.iter().enumerate() {
             let is_new = inputs.contains(input) && missing.get_mut(*input).is_some_and(std::mem::take);
@@ -142,8 +134,7 @@ impl TrainingRow {
     /// # Errors
     /// Names the first number outside its range.
     pub fn validate(&self, table: &Table) -> Result<(), FieldError> {
-        table.number("time_s", self.time_s, SIGNED)?;
-        table.number("strain", self.strain, SIGNED)?;
+        check!(table, self; time_s: SIGNED, strain: SIGNED)?;
         table.numbers("past", &self.past, SIGNED)?;
         table.numbers("future", &self.future, SIGNED)?;
         table.numbers("filtered", &self.filtered, SIGNED)?;

@@ -56,6 +56,16 @@ pub const NON_NEGATIVE: Allowed = Allowed { least: 0.0, most: f64::INFINITY };
 /// Largest change of resistance, relative to R₀, of a gauge curve within the law's range.
 pub const LARGEST_CHANGE: f64 = 1e6;
 
+/// Checks that fields of a structure are allowed, in this order; the error names the first that is not.
+macro_rules! check {
+    ($table:expr, $of:expr; $($field:ident: $allowed:expr),+ $(,)?) => {
+        [$((stringify!($field), $of.$field, $allowed)),+]
+            .into_iter()
+            .try_for_each(|(name, value, allowed)| $table.number(name, value, allowed))
+    };
+}
+pub(crate) use check;
+
 /// A table of the file, identified by its path.
 pub struct Table(String);
 
@@ -105,6 +115,14 @@ impl Table {
         }
         let Allowed { least, most } = allowed;
         Err(self.wrong(name, format!("{} to {}", short(least), short(most)), short(value)))
+    }
+
+    /// Checks that a number is allowed, if it is there.
+    ///
+    /// # Errors
+    /// Names the field if not.
+    pub fn some(&self, name: &str, value: Option<f64>, allowed: Allowed) -> Result<(), FieldError> {
+        value.map_or(Ok(()), |value| self.number(name, value, allowed))
     }
 
     /// Checks that all numbers are allowed.
