@@ -3,11 +3,12 @@ use std::io;
 use std::path::Path;
 use std::process::ExitCode;
 
-use ohmstrain::trace::TraceFileError;
+use ohmstrain::trace::{Refusal, TraceFileError};
 use ohmstrain::{Error as LibraryError, Quantity};
 use ohmstrain_bench_data::TraceError;
 use ohmstrain_calib::CalibrationError;
 use ohmstrain_export::ExportError;
+use ohmstrain_report::ReportingError;
 use thiserror::Error;
 
 use crate::messages::Messages;
@@ -59,11 +60,7 @@ impl CliError {
 
     /// Creates the error of a calibration that failed on the contents of `files`.
     pub fn calibration(files: &[&str], error: &CalibrationError) -> Self {
-        match error {
-            CalibrationError::Optimiser(_) => Self::Other(error.to_string()),
-            CalibrationError::TooFewRows { recording, .. } => Self::Input(format!("{}: {error}", files[*recording])),
-            _ => Self::Input(format!("{}: {error}", files.join(", "))),
-        }
+        Refusal::calibration(files, error.clone()).into()
     }
 
     /// Adds the input's name to an error about its contents.
@@ -91,6 +88,16 @@ impl CliError {
             ExportError::Template(_) => Self::Other(error.to_string()),
         }
     }
+
+    /// Converts the reason why the recording `name` has no estimates or no report.
+    pub fn reporting(error: ReportingError, name: &str) -> Self {
+        match error {
+            ReportingError::Build(error) => error.into(),
+            ReportingError::Row { row, source } => Self::from(LibraryError::Row { row, source }).named(name),
+            ReportingError::Rows(error) => Self::from(error).named(name),
+            ReportingError::Report(error) => Self::Other(error.to_string()),
+        }
+    }
 }
 
 impl From<LibraryError> for CliError {
@@ -107,6 +114,16 @@ impl From<LibraryError> for CliError {
             }
             LibraryError::Row { row, source } => Self::Input(format!("data row {}: {source}", row + 1)),
             _ => Self::Input(error.to_string()),
+        }
+    }
+}
+
+impl From<Refusal> for CliError {
+    fn from(refusal: Refusal) -> Self {
+        match refusal {
+            Refusal::Library(error) => error.into(),
+            Refusal::Calibration(_, error @ CalibrationError::Optimiser(_)) => Self::Other(error.to_string()),
+            _ => Self::Input(refusal.to_string()),
         }
     }
 }

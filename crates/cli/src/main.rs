@@ -18,7 +18,6 @@ mod marks;
 mod messages;
 mod output;
 mod parquet_table;
-mod plausible;
 mod port;
 mod printable;
 mod progress;

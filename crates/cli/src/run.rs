@@ -1,5 +1,4 @@
-use ohmstrain::trace::TraceFile;
-use ohmstrain::{Error, Estimate, EstimatorKind, FilterBuilder, Known, Sensor};
+use ohmstrain::{Error, FilterBuilder, Sensor};
 
 use crate::args::{EstimateArgs, RestResistance, Without};
 use crate::error::CliError;
@@ -79,52 +78,5 @@ pub fn median(mut known: Vec<f64>) -> Option<f64> {
         0 => None,
         n if n % 2 == 1 => Some(known[n / 2]),
         n => Some(0.5 * (known[n / 2 - 1] + known[n / 2])),
-    }
-}
-
-/// Results of both passes over a recording.
-pub struct Estimated {
-    /// The filter's estimates, row by row.
-    pub filtered: Vec<Estimate>,
-    /// The smoother's.
-    pub smoothed: Vec<Estimate>,
-}
-
-/// Filters and smooths a recording in which some strains are `known`; `kind` replaces the sensor's default estimator.
-pub fn estimate(
-    recording: &TraceFile,
-    sensor: &Sensor,
-    rest_resistance: Option<f64>,
-    kind: Option<EstimatorKind>,
-    known: &[Known],
-) -> Result<Estimated, CliError> {
-    let len = recording.trace.len();
-    let mut builder = sensor.filter().known(known).estimator(kind.unwrap_or(sensor.params().default_estimator));
-    if let Some(measured) = rest_resistance {
-        builder = builder.rest_resistance(measured);
-    }
-    let named = |error: CliError| error.named(&recording.name);
-    let mut filter = builder.build().map_err(CliError::from)?;
-    let mut filtered = Vec::with_capacity(len);
-    for row in 0..len {
-        let (time_s, reading) = recording.reading(row);
-        let estimate = filter.step(time_s, reading).map_err(|error| named(at_row(row, error)))?;
-        filtered.push(estimate);
-    }
-    let mut smoothed = Vec::with_capacity(len);
-    let keep = |_, segment: &[Estimate]| {
-        smoothed.extend(segment.iter().rev());
-        Ok::<(), CliError>(())
-    };
-    builder.smooth_backward(len, |row| recording.reading(row), keep).map_err(named)?;
-    smoothed.reverse();
-    Ok(Estimated { filtered, smoothed })
-}
-
-/// Creates the error of a row that a filter refused.
-fn at_row(row: usize, error: Error) -> CliError {
-    match error {
-        Error::Step(source) => Error::Row { row, source }.into(),
-        other => other.into(),
     }
 }

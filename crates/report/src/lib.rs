@@ -1,6 +1,8 @@
 //! The report: one HTML file that needs neither network nor scripts, with plots, scores and parameters. With scripts, plots
 //! show the values under the pointer and can be zoomed.
 //!
+//! The feature `trace` adds reports on recordings as a sensor estimates them.
+//!
 //! Any input gives a report: missing readings and references break lines, what cannot be drawn is said in words. Its
 //! size does not grow with the recording's length (`thin.rs`). The same input gives the same bytes.
 
@@ -14,9 +16,13 @@ mod ink;
 mod innovations;
 mod law;
 mod motion;
+#[cfg(feature = "trace")]
+mod of_trace;
 mod pieces;
 mod recording;
 mod relation;
+#[cfg(feature = "trace")]
+pub mod scoring;
 mod speeds;
 mod summary;
 mod tables;
@@ -33,6 +39,8 @@ use figures::Figure;
 pub use ink::Ink;
 use innovations::Innovations;
 pub use law::Law;
+#[cfg(feature = "trace")]
+pub use of_trace::{Drawn, Estimated, Reporting, ReportingError, estimate};
 use recording::PlottedRecording;
 use tables::Table;
 

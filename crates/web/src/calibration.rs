@@ -1,16 +1,12 @@
 //! Calibration as by `ohmstrain calibrate`, with progress.
 
 use js_sys::{Date, Function};
-use ohmstrain::trace::{TraceFile, check_alike, first_distrusted_rows, known_recordings};
-use ohmstrain::{
-    Calibration, Closing, EstimatorKind, GaugeFamily, Kept, LeftOutRow, Stage, Tested, calibration_doubts,
-    motion_doubts,
-};
-use ohmstrain_calib::{Samples, screen};
+use ohmstrain::trace::{self, TraceFile};
+use ohmstrain::{Calibration, Closing, EstimatorKind, GaugeFamily, LeftOutRow, Stage, Tested};
 use serde::Deserialize;
 use wasm_bindgen::prelude::*;
 
-use crate::doubts::{on_one_clock, refuse_or_warn};
+use crate::doubts::on_one_clock;
 use crate::json::{json, parsed, refused};
 use crate::recording::Recording;
 use crate::sensor::Sensor;
@@ -31,10 +27,15 @@ struct Choices {
 }
 
 impl Choices {
+    /// Returns the chosen estimator, if there is one.
+    fn chosen(&self) -> Result<Option<EstimatorKind>, String> {
+        self.estimator.as_deref().filter(|name| *name != "auto").map(estimator).transpose()
+    }
+
     fn calibration(&self) -> Result<Calibration<'static>, String> {
         let mut calibration = Calibration::new();
-        if let Some(wanted) = self.estimator.as_deref().filter(|name| *name != "auto") {
-            calibration = calibration.estimator(estimator(wanted)?);
+        if let Some(kind) = self.chosen()? {
+            calibration = calibration.estimator(kind);
         }
         if let Some(branches) = self.branches {
             if branches > 4 {
@@ -97,22 +98,17 @@ fn run(wholes: Vec<TraceFile>, choices: &Choices, progress: Option<&Function>) -
     let lags_s = recordings.iter_mut().map(|one| on_one_clock(one, choices.align, &mut warnings));
     let lags_s: Vec<f64> = lags_s.collect::<Result<_, _>>()?;
     let start_ms = Date::now();
-    let calibrated = of_recordings(&recordings, choices.calibration()?, progress, &mut warnings)?;
-    let calibration_s = (Date::now() - start_ms) / 1e3;
-    let mut kept = Vec::new();
-    for ((whole, part), lag_s) in wholes.into_iter().zip(&recordings).zip(lags_s) {
-        if part.trace.len() < whole.trace.len() {
-            let mut whole = whole;
-            whole.move_reference(lag_s).map_err(text)?;
-            let whole = whole.at_reference_temperature(&calibrated.sensor).into_owned();
-            kept.push((whole, part.first_row..part.first_row + part.trace.len()));
-        }
+    let (calibration, warn) = (choices.calibration()?, |warning| warnings.push(warning));
+    if recordings.is_empty() {
+        return Err("expected a recording, found none".into());
     }
-    let rows: Vec<_> = kept.iter().map(|(whole, _)| |row| whole.known_row(row)).collect();
-    let kept =
-        kept.iter().zip(&rows).map(|((whole, seen), row)| Kept { len: whole.trace.len(), row, seen: seen.clone() });
-    let tested = calibrated.sensor.tested_on(&kept.collect::<Vec<_>>());
-    let (sensor, tested) = tested.map_err(|error| error.to_string())?;
+    let calibrated = trace::calibrate(&recordings, calibration, warn, |stage| tell(progress, stage))
+        .map_err(|error| error.to_string())?;
+    let calibration_s = (Date::now() - start_ms) / 1e3;
+    let kept = wholes.into_iter().zip(&recordings).zip(lags_s);
+    let kept = kept.filter(|((whole, part), _)| part.trace.len() < whole.trace.len());
+    let kept = kept.map(|((whole, part), lag_s)| (whole, part.first_row..part.first_row + part.trace.len(), lag_s));
+    let (sensor, tested) = trace::tested_on(calibrated.sensor, kept).map_err(|error| error.to_string())?;
     let closing = Closing {
         file: choices.file.as_deref(),
         params: sensor.params(),
@@ -122,52 +118,10 @@ fn run(wholes: Vec<TraceFile>, choices: &Choices, progress: Option<&Function>) -
         more: "--explain",
     };
     let (lines, facts, is_better) = (closing.lines(), closing.facts(), closing.is_better());
-    let kind = choices.estimator.as_deref().filter(|name| !["auto", EstimatorKind::Corrected.name()].contains(name));
-    if let Some(kind) = kind.filter(|_| is_better == Some(false)) {
-        let file = choices.file.as_deref().unwrap_or("the sensor");
-        warnings.push(format!(
-            "{file}: {kind} is no better than a static curve; without --estimator, calibrate tries others and a correction"
-        ));
-    }
+    warnings.extend(closing.warning(choices.chosen()?));
     let advice = calibrated.findings.as_ref().map_or_else(Vec::new, |found| found.advice.clone());
     let times = recordings.into_iter().map(|recording| recording.trace.time_s).collect();
     Ok(Calibrated { lines, facts, is_better, advice, warnings, tested, times, left_out: calibrated.left_out, sensor })
-}
-
-/// Calibrates a sensor on recordings: untrustworthy rows are left out first, and doubts are raised.
-fn of_recordings(
-    recordings: &[TraceFile],
-    calibration: Calibration,
-    progress: Option<&Function>,
-    warnings: &mut Vec<String>,
-) -> Result<ohmstrain::Calibrated, String> {
-    if recordings.is_empty() {
-        return Err("expected a recording, found none".into());
-    }
-    let samples = recordings.iter().map(TraceFile::samples).collect::<Result<Vec<Samples>, _>>().map_err(text)?;
-    check_alike(recordings).map_err(text)?;
-    let names: Vec<&str> = recordings.iter().map(|recording| recording.name.as_str()).collect();
-    let named = |error: &ohmstrain::CalibrationError| match error {
-        ohmstrain::CalibrationError::TooFewRows { recording, .. } => format!("{}: {error}", names[*recording]),
-        _ => format!("{}: {error}", names.join(", ")),
-    };
-    let as_read = known_recordings(recordings, &samples).map_err(text)?;
-    refuse_or_warn(recordings, &motion_doubts(&as_read), warnings)?;
-    let screened = screen(&samples).map_err(|error| named(&error))?;
-    let known = known_recordings(recordings, &screened.samples()).map_err(text)?;
-    refuse_or_warn(recordings, &calibration_doubts(&known), warnings)?;
-    warnings.extend(first_distrusted_rows(&screened.distrusted, recordings));
-    let calibrated = calibration.run_with(&known, |stage| tell(progress, stage)).map_err(|error| match &error {
-        ohmstrain::Error::Calibration(error) => named(error),
-        other => other.to_string(),
-    })?;
-    refuse_or_warn(recordings, &calibrated.doubts(), warnings)?;
-    Ok(calibrated)
-}
-
-/// Returns an error's text.
-fn text(error: impl ToString) -> String {
-    error.to_string()
 }
 
 /// Reports the stage of a calibration.

@@ -1,24 +1,7 @@
-//! Doubts of the library in the words of the command line, with the flags that answer them. Refusals are errors, the others
-//! warnings.
+//! Late references in the words of the command line, with the flags that answer them.
 
-use ohmstrain::trace::{TraceFile, doubt_text};
-use ohmstrain::{CalibrationDoubt, Interface, LagAnswer};
-
-/// Adds the warnings about a calibration; the first doubt that needs an answer is an error.
-pub fn refuse_or_warn(
-    recordings: &[TraceFile],
-    doubts: &[CalibrationDoubt],
-    warnings: &mut Vec<String>,
-) -> Result<(), String> {
-    for doubt in doubts {
-        let text = doubt_text(doubt, recordings);
-        if doubt.is_refusal() {
-            return Err(text);
-        }
-        warnings.push(text);
-    }
-    Ok(())
-}
+use ohmstrain::trace::TraceFile;
+use ohmstrain::{Interface, LagAnswer};
 
 /// Reports the lag of a reference, and moves it if `align`; returns the lag by which it was moved, s. A lag that is certainly too large is an error.
 pub fn on_one_clock(recording: &mut TraceFile, align: bool, warnings: &mut Vec<String>) -> Result<f64, String> {

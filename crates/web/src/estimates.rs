@@ -93,15 +93,9 @@ pub fn smoothed(sensor: &Sensor, recording: &TraceFile) -> Result<Estimates, Str
     let recording = &*recording.at_reference_temperature(sensor);
     let sensor = seated(sensor, recording)?;
     check_readings(&sensor, recording, recording.trace.len())?;
-    let mut rows = Vec::with_capacity(recording.trace.len());
-    let keep = |_, segment: &[Estimate]| {
-        rows.extend(segment.iter().rev());
-        Ok::<(), ohmstrain::Error>(())
-    };
-    let named = |error| format!("{}: {error}", recording.name);
-    sensor.filter().smooth_backward(recording.trace.len(), |row| recording.reading(row), keep).map_err(named)?;
-    rows.reverse();
-    Ok(made(&sensor, recording, rows))
+    let readings: Vec<_> = (0..recording.trace.len()).map(|row| recording.reading(row).1).collect();
+    let rows = sensor.filter().smooth_readings(&recording.trace.time_s, &readings);
+    Ok(made(&sensor, recording, rows.map_err(|error| format!("{}: {error}", recording.name))?))
 }
 
 /// Returns the number of rows that are searched first.

@@ -1,18 +1,14 @@
 use std::ops::Range;
 use std::time::Instant;
 
-use ohmstrain::trace::{TraceFile, check_alike, known_recordings};
-use ohmstrain::{
-    Calibrated, Calibration, Closing, Error, EstimatorKind, Findings, Kept, Sensor, Tested, calibration_doubts,
-    motion_doubts,
-};
-use ohmstrain_calib::{Samples, screen};
+use ohmstrain::trace::{self, TraceFile};
+use ohmstrain::{Calibrated, Calibration, Closing, Findings, Sensor, Tested};
 
 use super::closing;
 use super::explain;
 use super::fleet;
 use super::hand;
-use super::reporting::{Reporting, Wanted};
+use super::reporting::{Wanted, drawn};
 use crate::alignment;
 use crate::args::{CalibrateArgs, Coefficients};
 use crate::channels::Table;
@@ -21,10 +17,9 @@ use crate::input;
 use crate::marks;
 use crate::messages::Messages;
 use crate::output::{Kind, Outputs, named, print};
-use crate::plausible;
 use crate::progress::Progress;
 use crate::sensor_file;
-use ohmstrain_report::{Sample, Scored};
+use ohmstrain_report::{Reporting, Sample, Scored};
 
 /// Calibrates a sensor on recordings, writes its parameters, and prints a summary.
 pub fn run(args: &CalibrateArgs, messages: &Messages) -> Result<(), CliError> {
@@ -104,16 +99,8 @@ pub fn calibrate(args: &CalibrateArgs, messages: &Messages) -> Result<Outcome, C
     let Calibrated { sensor, findings, .. } = calibrate_recordings(&recordings, wished, &progress)?;
     drop(progress);
     let calibration_s = start.elapsed().as_secs_f64();
-    for (recording, whole, _) in &mut kept {
-        whole.move_reference(lags_s[*recording])?;
-    }
-    for (_, whole, _) in &mut kept {
-        *whole = whole.at_reference_temperature(&sensor).into_owned();
-    }
-    let rows: Vec<_> = kept.iter().map(|(_, whole, _)| |row| whole.known_row(row)).collect();
-    let kept =
-        kept.iter().zip(&rows).map(|((_, whole, seen), row)| Kept { len: whole.trace.len(), row, seen: seen.clone() });
-    let (sensor, tested) = sensor.tested_on(&kept.collect::<Vec<_>>())?;
+    let kept = kept.into_iter().map(|(place, whole, seen)| (whole, seen, lags_s[place]));
+    let (sensor, tested) = trace::tested_on(sensor, kept)?;
     outputs.put(sensor_output, sensor_file::text(&sensor)?);
     let mut outcome = Outcome { sensor, findings, tested, calibration_s, explained: String::new() };
     let file = args.output.display().to_string();
@@ -129,15 +116,10 @@ pub fn calibrate(args: &CalibrateArgs, messages: &Messages) -> Result<Outcome, C
             tested: outcome.tested.as_ref(),
             facts: &closing.facts(),
         };
-        wanted.put(reporting.drawn()?, &mut outputs)?;
+        wanted.put(drawn(&reporting)?, &mut outputs)?;
     }
-    if let Some(chosen) = args.estimator.chosen().filter(|chosen| *chosen != EstimatorKind::Corrected)
-        && closing.is_better() == Some(false)
-    {
-        messages.warning(&format!(
-            "{file}: {} is no better than a static curve; without --estimator, calibrate tries others and a correction",
-            chosen.name()
-        ));
+    if let Some(warning) = closing.warning(args.estimator.chosen()) {
+        messages.warning(&warning);
     }
     outcome.explained = explain::text(args, &recordings, &outcome.sensor.params().law)?;
     outputs.publish()?;
@@ -174,21 +156,6 @@ pub fn calibrate_recordings(
     calibration: Calibration,
     progress: &Progress,
 ) -> Result<Calibrated, CliError> {
-    let samples: Vec<Samples> = recordings.iter().map(TraceFile::samples).collect::<Result<_, _>>()?;
-    check_alike(recordings)?;
-    let names: Vec<&str> = recordings.iter().map(|recording| recording.name.as_str()).collect();
-    let as_read = known_recordings(recordings, &samples)?;
-    plausible::refuse_or_warn(recordings, &motion_doubts(&as_read), progress.messages())?;
-    let screened = screen(&samples).map_err(|error| CliError::calibration(&names, &error))?;
-    let samples = screened.samples();
-    let known = known_recordings(recordings, &samples)?;
-    plausible::refuse_or_warn(recordings, &calibration_doubts(&known), progress.messages())?;
-    plausible::warn_of_distrusted(recordings, &screened.distrusted, progress.messages());
-    let calibrated =
-        calibration.run_with(&known, |stage| progress.calibrating(stage)).map_err(|error| match error {
-            Error::Calibration(error) => CliError::calibration(&names, &error),
-            other => other.into(),
-        })?;
-    plausible::refuse_or_warn(recordings, &calibrated.doubts(), progress.messages())?;
-    Ok(calibrated)
+    let warn = |warning: String| progress.messages().warning(&warning);
+    Ok(trace::calibrate(recordings, calibration, warn, |stage| progress.calibrating(stage))?)
 }

@@ -4,9 +4,8 @@ use ohmstrain::{Calibrated, Calibration, Closing, Estimate, Sensor};
 use ohmstrain_bench_data::simulate::{Material, SimulationSettings};
 
 use super::calibrate::calibrate_recordings;
-use super::reporting::{Reporting, Wanted};
+use super::reporting::{Wanted, drawn};
 use super::score_table::{KEY, add_scores, score_table};
-use super::scoring;
 use super::simulate;
 use super::smooth::write_estimates;
 use crate::args::{DemoArgs, DemoMaterial, ReportArgs};
@@ -15,9 +14,8 @@ use crate::input;
 use crate::messages::Messages;
 use crate::output::{Kind, Outputs, print};
 use crate::progress::Progress;
-use crate::run::estimate;
 use crate::sensor_file;
-use ohmstrain_report::{Sample, Scored};
+use ohmstrain_report::{Reporting, Sample, Scored, estimate, scoring};
 
 /// Share of the recording used for calibration; the rest is the test.
 const CALIBRATION_SHARE: f64 = 0.5;
@@ -50,7 +48,8 @@ pub fn run(args: &DemoArgs, messages: &Messages) -> Result<(), CliError> {
     outputs.put(sensor_output, sensor_file::text(&sensor)?);
 
     progress.doing("filtering and smoothing");
-    let estimated = estimate(&recording, &sensor, None, None, &[])?;
+    let estimated =
+        estimate(&recording, &sensor, None, None, &[]).map_err(|error| CliError::reporting(error, &recording.name))?;
     outputs.put(filtered_output, estimates(&sensor, &estimated.filtered)?);
     outputs.put(smoothed_output, estimates(&sensor, &estimated.smoothed)?);
     progress.doing("writing the report");
@@ -74,7 +73,7 @@ pub fn run(args: &DemoArgs, messages: &Messages) -> Result<(), CliError> {
         facts: &closing.facts(),
     };
     if let Some(wanted) = wanted {
-        wanted.put(reporting.drawn()?, &mut outputs)?;
+        wanted.put(drawn(&reporting)?, &mut outputs)?;
     }
     outputs.publish()?;
     drop(progress);

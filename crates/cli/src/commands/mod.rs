@@ -21,7 +21,6 @@ mod record;
 mod refine;
 mod reporting;
 mod score_table;
-mod scoring;
 mod serial_check;
 mod serve;
 mod shell;

@@ -1,7 +1,7 @@
 //! Summary of a calibration, in words.
 
 use ohmstrain_sensor::{
-    Findings, Limit, Quantity, RecordingSummary, Scores, SensorParams, TemperatureParams, TestedSummary,
+    EstimatorKind, Findings, Limit, Quantity, RecordingSummary, Scores, SensorParams, TemperatureParams, TestedSummary,
 };
 use serde::Serialize;
 
@@ -99,6 +99,22 @@ impl Closing<'_> {
     #[must_use]
     pub fn is_better(&self) -> Option<bool> {
         is_better(&self.known())
+    }
+
+    /// Returns a warning if the estimator was `chosen`, and is no better than a static curve.
+    ///
+    /// ```
+    /// fn warn(closing: &ohmstrain::Closing, chosen: Option<ohmstrain::EstimatorKind>) {
+    ///     closing.warning(chosen).iter().for_each(|warning| println!("{warning}"));
+    /// }
+    /// ```
+    #[must_use]
+    pub fn warning(&self, chosen: Option<EstimatorKind>) -> Option<String> {
+        let chosen = chosen.filter(|chosen| *chosen != EstimatorKind::Corrected && self.is_better() == Some(false))?;
+        let (file, name) = (self.file.unwrap_or("the sensor"), chosen.name());
+        Some(format!(
+            "{file}: {name} is no better than a static curve; without --estimator, calibrate tries others and a correction"
+        ))
     }
 
     /// Describes by how much intervals are wider than the estimator's, to cover errors on held-out rows.

@@ -1,5 +1,6 @@
 //! Recordings as traces: the rows of a trace CSV, with the name, the header and the hash of its file.
 
+mod calibrate;
 mod hand;
 mod marks;
 
@@ -11,18 +12,16 @@ use std::path::Path;
 use ohmstrain_bench_data::{
     Metadata, Reading as TraceReading, ReadingKind, ReferenceQuantity, Trace, TraceError, TraceReader,
 };
-use ohmstrain_calib::{Distrusted, Samples, SamplesError, aligned};
+use ohmstrain_calib::{Samples, SamplesError, aligned};
 use ohmstrain_sensor::{JointParams, Quantity, ReadingUnit};
 use thiserror::Error;
 
 pub use crate::column::reading_column;
 use crate::number::significant;
-use crate::{CalibrationDoubt, Error, Interface, Reading, Recording, Sensor};
+use crate::{Error, Reading, Recording, Sensor};
+pub use calibrate::{Refusal, calibrate, distrusted_rows, tested_on};
 pub use hand::{HAND_FORMAT, HandChannel, HandDescription, HandError, HandJoint};
 pub use marks::{Marked, take_marks};
-
-/// Number of excluded rows that are named one by one.
-const NAMED_ROWS: usize = 5;
 
 /// A recording in memory.
 #[derive(Clone, Debug)]
@@ -350,33 +349,4 @@ pub fn check_unit(header: &str, found: ReadingKind, expected: ReadingUnit) -> Re
     }
     let (expected, found) = (reading_column(expected), reading_column(found));
     Err(TraceFileError::Unit { header: header.to_owned(), expected, found })
-}
-
-/// Formats a doubt for the command line, with the names of its recordings.
-pub fn doubt_text(doubt: &CalibrationDoubt, recordings: &[TraceFile]) -> String {
-    let file = |place: usize| &recordings[place];
-    let places = doubt.recordings();
-    let names = match places[..] {
-        [] => String::new(),
-        [one] => format!("{}: ", file(one).header),
-        _ => places.iter().map(|place| file(*place).name.as_str()).collect::<Vec<_>>().join(" and ") + ": ",
-    };
-    names + &doubt.text(Interface::CommandLine)
-}
-
-/// Lists the rows that are excluded from a calibration.
-pub fn distrusted_rows(rows: &[Distrusted], recordings: &[TraceFile]) -> Vec<String> {
-    let line = |one: &Distrusted| {
-        let file = &recordings[one.recording];
-        let row = file.first_row + one.row + 1;
-        format!("{}: data row {row} ({} s): {}; left out of the calibration", file.name, one.time_s, one.doubt)
-    };
-    rows.iter().map(line).collect()
-}
-
-/// Lists the first of them, and the number of the others.
-pub fn first_distrusted_rows(rows: &[Distrusted], recordings: &[TraceFile]) -> Vec<String> {
-    let (first, more) = rows.split_at(rows.len().min(NAMED_ROWS));
-    let rest = (!more.is_empty()).then(|| format!("{} more rows are left out; --explain names all", more.len()));
-    distrusted_rows(first, recordings).into_iter().chain(rest).collect()
 }

@@ -1,11 +1,11 @@
 use std::io::Write;
 
 use ohmstrain_calib::SIMULATED_SEED;
+use ohmstrain_report::Drawn;
 use serde::Serialize;
 
 use super::scores::{PUBLISHED, RecordingScores};
 use super::summary::{self, Summary, summaries};
-use crate::commands::reporting::Drawn;
 use crate::commands::score_table::{KEY, add_scores, score_table};
 use crate::error::CliError;
 use crate::output;

@@ -19,7 +19,7 @@ use sensors::{JudgedSensor, Rivals, phases};
 use crate::args::{EvaluateArgs, Split};
 use crate::commands::hand;
 use crate::commands::hand::scores::{self as joint_scores, JointScores};
-use crate::commands::reporting::{Drawn, Reporting, Wanted};
+use crate::commands::reporting::{Wanted, drawn};
 use crate::error::CliError;
 use crate::input;
 use crate::messages::Messages;
@@ -28,7 +28,7 @@ use crate::progress::Progress;
 use crate::run::rest_resistance;
 use crate::sensor_file;
 use crate::suits;
-use ohmstrain_report::{Sample, Scored};
+use ohmstrain_report::{Drawn, Reporting, Sample, Scored};
 
 /// Smallest coverage of the 95 % interval that `--check` accepts.
 const LEAST_COVERAGE: f64 = 0.8;
@@ -247,7 +247,7 @@ fn judge(
         let (kind, tested, facts) = (Some(*kind), None, &[]);
         let reporting =
             Reporting { recording, sensor: first, kind, rest_resistance: rest, part, sample, tested, facts };
-        judged.drawn = Some(reporting.drawn()?);
+        judged.drawn = Some(drawn(&reporting)?);
     }
     Ok(judged)
 }

@@ -12,12 +12,10 @@ use super::scores::{BaselineScores, LearnedScores, RecordingScores};
 use super::settled::SettledScores;
 use crate::args::Estimators;
 use crate::commands::calibrate::calibrate_recordings;
-use crate::commands::scoring;
 use crate::error::CliError;
 use crate::progress::Progress;
-use crate::run::estimate;
 use crate::sensor_file;
-use ohmstrain_report::{Sample, Scored};
+use ohmstrain_report::{Sample, Scored, estimate, scoring};
 
 /// A calibrated sensor and the estimator that it is judged with.
 pub struct JudgedSensor {
@@ -118,7 +116,8 @@ impl JudgedSensor {
         warnings: &mut Vec<String>,
     ) -> Result<Option<RecordingScores>, CliError> {
         let sensor = recording.sensor_for(&self.sensor);
-        let estimated = estimate(recording, &sensor, rest_resistance, Some(self.kind), &given.known)?;
+        let estimated = estimate(recording, &sensor, rest_resistance, Some(self.kind), &given.known)
+            .map_err(|error| CliError::reporting(error, &recording.name))?;
         if self.calibration_s.is_none() && given.name.is_none() {
             let mut watch = ValidityWatch::new(&self.sensor, rest_resistance);
             for (k, row) in estimated.filtered.iter().enumerate() {

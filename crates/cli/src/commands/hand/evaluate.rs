@@ -1,6 +1,6 @@
 //! Scores of a hand's estimates against the references of a recording of all its channels.
 
-use ohmstrain_report::Scored;
+use ohmstrain_report::{Scored, scoring};
 use std::path::Path;
 
 use ohmstrain::trace::{HandChannel, TraceFile};
@@ -13,7 +13,6 @@ use super::scores::{ChannelScores, JointScores};
 use super::{OF_ONE_SENSOR, joints, refuse_flags};
 use crate::args::{Estimators, EvaluateArgs};
 use crate::channels::{self, Table};
-use crate::commands::scoring;
 use crate::error::CliError;
 
 /// Scores every recording with the joints of a description, and passes its name and the scores to `show`.

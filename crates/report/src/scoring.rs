@@ -1,9 +1,10 @@
-use ohmstrain::Estimate;
-use ohmstrain_calib::{Baseline, ScoredRow};
-use ohmstrain_report::Scored;
-use ohmstrain_sensor::Scores;
+//! Scores of estimates and baselines on a recording.
 
 use ohmstrain::trace::TraceFile;
+use ohmstrain::{Estimate, Scores};
+use ohmstrain_calib::{Baseline, ScoredRow};
+
+use crate::Scored;
 
 /// Scores the rows of `part` with strain and deviation from `estimate`; `None` without a reference.
 pub fn scores(recording: &TraceFile, part: Scored, estimate: impl Fn(usize) -> (f64, Option<f64>)) -> Option<Scores> {
