@@ -1,5 +1,4 @@
-//! The sensor's own law, linearised once, in adskalman's filter and smoother. Unlike random linear models, the linearisation
-//! has offsets.
+//! The sensor's own law, linearised once, in adskalman's filter and smoother; the linearisation has offsets.
 
 use adskalman::{KalmanFilterNoControl, StateAndCovariance};
 use nalgebra::SVector;

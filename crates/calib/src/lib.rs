@@ -1,6 +1,6 @@
 //! Calibration of soft strain sensors: from bench recordings with known strain to the parameters of a filter.
 //!
-//! [`calibrate_with_prior`] fits a law per strength of ridge, and noise and motion to each of them such that the filter's posterior fits
+//! [`calibrate`] fits a law per strength of ridge, and noise and motion to each of them such that the filter's posterior fits
 //! the known strain. The law with the best filter is chosen. [`fit_law`] fits a law by itself.
 //! [`SensorParams`](ohmstrain_sensor::SensorParams) is the stored result, from which a filter runs.
 //!
@@ -44,7 +44,7 @@ pub use calibrate::recipe::{RECIPE, Recipe};
 pub use calibrate::scores::{ScoredRow, score};
 pub use calibrate::simulated_motions::SIMULATED_SEED;
 pub use calibrate::unstated::unstated;
-pub use calibrate::with_prior::calibrate_with_prior;
+pub use calibrate::with_prior::calibrate;
 pub use calibrate::{Calibration, Stage};
 pub use error::CalibrationError;
 pub use format_8::CorrectionOfFormat8;

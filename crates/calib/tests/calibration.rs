@@ -4,8 +4,8 @@ use std::cell::OnceCell;
 use std::f64::consts::TAU;
 
 use ohmstrain_calib::{
-    Calibration, CalibrationError, GaugeFamily, LawFit, LawOptions, Samples, ScoredRow, Stage, calibrate_with_prior,
-    fit_law, identifiability,
+    Calibration, CalibrationError, GaugeFamily, LawFit, LawOptions, Samples, ScoredRow, Stage, calibrate, fit_law,
+    identifiability,
 };
 use ohmstrain_ekf::Reading;
 use ohmstrain_sensor::{
@@ -123,8 +123,7 @@ fn calibration_makes_a_filter_that_beats_the_static_inverse_and_knows_how_far() 
     let bench = record(1500.0, 0.0, 2e-3);
     let half = bench.time_s.len() / 2;
     let training = bench.samples().head(half);
-    let calibration =
-        calibrate_with_prior(&[training], &[LawOptions::default()], &[EstimatorKind::Ekf], None, |_| ()).unwrap();
+    let calibration = calibrate(&[training], &[LawOptions::default()], &[EstimatorKind::Ekf], None, |_| ()).unwrap();
     let params = sensor(&calibration);
     let mut filter = build_filter(&params, None, Start::Unknown).unwrap();
     let (mut filtered, mut cubic) = (Vec::new(), Vec::new());
@@ -160,8 +159,7 @@ fn calibration_makes_a_filter_that_beats_the_static_inverse_and_knows_how_far() 
     wide.estimators.values_mut().for_each(|of| of.strain_sd_scale = LARGEST_SD_SCALE);
     assert_eq!(wide.widened_most(), ["filter"]);
     // Same samples, same parameters.
-    let repeated =
-        calibrate_with_prior(&[training], &[LawOptions::default()], &[EstimatorKind::Ekf], None, |_| ()).unwrap();
+    let repeated = calibrate(&[training], &[LawOptions::default()], &[EstimatorKind::Ekf], None, |_| ()).unwrap();
     assert_eq!((repeated.law, repeated.estimators), (calibration.law, calibration.estimators));
 }
 
@@ -175,8 +173,7 @@ fn the_estimator_that_does_best_becomes_the_default() {
             (calls, announced) = (done, expected);
         }
     };
-    let calibration =
-        calibrate_with_prior(&[bench.samples().head(600)], &[LawOptions::default()], &kinds, None, count).unwrap();
+    let calibration = calibrate(&[bench.samples().head(600)], &[LawOptions::default()], &kinds, None, count).unwrap();
     let best = calibration.estimators[&calibration.default_estimator].score;
     for kind in kinds {
         // A single Gaussian must be better by 0.1.
@@ -185,7 +182,7 @@ fn the_estimator_that_does_best_becomes_the_default() {
     }
     // A step of Nelder-Mead evaluates one or two points, and after a shrinkage all corners of the simplex.
     assert!(calls > announced / 2 && calls < 2 * announced, "{calls} of {announced}");
-    let nobody = calibrate_with_prior(&[bench.samples()], &[LawOptions::default()], &[], None, |_| ());
+    let nobody = calibrate(&[bench.samples()], &[LawOptions::default()], &[], None, |_| ());
     assert!(matches!(nobody.unwrap_err(), CalibrationError::Unsupported(_)));
 }
 
@@ -201,8 +198,7 @@ fn a_finer_recording_gives_the_same_filter() {
         Bench { time_s: between(&coarse.time_s), reading: between(&coarse.reading), strain: between(&coarse.strain) };
     let of = |bench: &Bench| {
         let kinds = [EstimatorKind::Ekf];
-        let calibration =
-            calibrate_with_prior(&[bench.samples()], &[LawOptions::default()], &kinds, None, |_| ()).unwrap();
+        let calibration = calibrate(&[bench.samples()], &[LawOptions::default()], &kinds, None, |_| ()).unwrap();
         (calibration.law, calibration.estimators[&EstimatorKind::Ekf])
     };
     let ((coarse_law, coarse), (fine_law, fine)) = (of(&coarse), of(&fine));
@@ -218,14 +214,8 @@ fn a_finer_recording_gives_the_same_filter() {
 #[test]
 fn a_refused_row_changes_nothing() {
     let bench = record(1500.0, 0.0, 2e-3);
-    let calibration = calibrate_with_prior(
-        &[bench.samples().head(700)],
-        &[LawOptions::default()],
-        &[EstimatorKind::Ekf],
-        None,
-        |_| (),
-    )
-    .unwrap();
+    let calibration =
+        calibrate(&[bench.samples().head(700)], &[LawOptions::default()], &[EstimatorKind::Ekf], None, |_| ()).unwrap();
     let text = format!(
         "format = 9\nmade_by = 'test'\nquantity = 'strain'\nreading = 'ohm'\nrest_reading = {}\ndefault_estimator = 'ekf'\n",
         calibration.rest_readings[0]
@@ -270,8 +260,7 @@ fn the_order_of_the_recordings_changes_nothing() {
     let first = OnceCell::new();
     for order in [[0, 1, 2], [2, 1, 0]] {
         let recordings = order.map(|index| given[index]);
-        let made =
-            calibrate_with_prior(&recordings, &[LawOptions::default()], &[EstimatorKind::Ekf], None, |_| ()).unwrap();
+        let made = calibrate(&recordings, &[LawOptions::default()], &[EstimatorKind::Ekf], None, |_| ()).unwrap();
         let first = first.get_or_init(|| made.clone());
         assert_eq!(sensor(&made), sensor(first));
         assert_eq!(made.rest_readings, order.map(|index| first.rest_readings[index]));
@@ -280,13 +269,8 @@ fn the_order_of_the_recordings_changes_nothing() {
         assert!(made.left_out.iter().all(|row| row.truth == recordings[row.recording].strain()[row.row]));
         assert!(made.left_out.is_sorted_by_key(|row| row.recording));
     }
-    let short = calibrate_with_prior(
-        &[given[1], given[0].head(20)],
-        &[LawOptions::default()],
-        &[EstimatorKind::Ekf],
-        None,
-        |_| (),
-    );
+    let short =
+        calibrate(&[given[1], given[0].head(20)], &[LawOptions::default()], &[EstimatorKind::Ekf], None, |_| ());
     assert!(matches!(short, Err(CalibrationError::TooFewRows { recording: 1, complete: 20, .. })), "{short:?}");
 }
 

@@ -95,7 +95,7 @@ impl CliError {
             ReportingError::Build(error) => error.into(),
             ReportingError::Row { row, source } => Self::from(LibraryError::Row { row, source }).named(name),
             ReportingError::Rows(error) => Self::from(error).named(name),
-            ReportingError::Report(error) => Self::Other(error.to_string()),
+            other => Self::Other(other.to_string()),
         }
     }
 }

@@ -1,4 +1,5 @@
-//! The response over one step against 160-digit arithmetic and against Van Loan's matrix exponential.
+//! The response over one step against 160-digit arithmetic, against Van Loan's matrix exponential, and against itself
+//! in two halves.
 
 use nalgebra::SMatrix;
 use ohmstrain_model::{Branch, MOTION_STATES as M, Motion, Response, Scalar};
@@ -21,11 +22,8 @@ fn ou(restoring: [f64; 2], density: f64) -> Motion<f64> {
     Motion::ornstein_uhlenbeck(1.0 / restoring[1], rate_sd, 0.0, strain_sd).unwrap()
 }
 
-/// Number of states of the motion and two branches.
-const N: usize = M + 2;
-
 /// Impulse response, its integral and the noise covariance of motion and branches in one vector or matrix.
-fn collect<T: Scalar>(response: &Response<T, 2>) -> ([T; N], [T; N], [[T; N]; N]) {
+fn collect<T: Scalar, const B: usize, const N: usize>(response: &Response<T, B>) -> ([T; N], [T; N], [[T; N]; N]) {
     let mut impulse = [T::zero(); N];
     let mut input = [T::zero(); N];
     let mut noise = [[T::zero(); N]; N];
@@ -55,7 +53,8 @@ fn collect<T: Scalar>(response: &Response<T, 2>) -> ([T; N], [T; N], [[T; N]; N]
 /// Relative to √(Qᵢᵢ Qⱼⱼ) for the covariance; relative to the largest entry of the same kind where a response has
 /// decayed away.
 fn check<T: Scalar>(response: &Response<T, 2>, row: &[f64], tolerance: f64, what: &str) {
-    let (impulse, input, noise) = collect(response);
+    const N: usize = 4;
+    let (impulse, input, noise) = collect::<T, 2, N>(response);
     let to = |x: T| nalgebra::try_convert::<T, f64>(x).unwrap();
     let dt = to(response.dt_s);
     for i in 0..N {
@@ -155,7 +154,7 @@ proptest! {
         let mut g = SMatrix::<f64, 4, 4>::zeros();
         g[(1, 1)] = 1.7;
         let (f, q) = van_loan::<4, 8>(a, g, dt);
-        let (_, _, noise) = collect(&response);
+        let (_, _, noise) = collect::<f64, 2, 4>(&response);
         for i in 0..4 {
             for j in 0..4 {
                 let scale = (q[(i, i)] * q[(j, j)]).sqrt();
@@ -165,6 +164,39 @@ proptest! {
                 let identity = f64::from(u8::from(i == j));
                 let got = if i < 2 { identity + response.motion_change[i][j] } else { response.drive[i - 2][j] };
                 prop_assert!((got - f[(i, j)]).abs() < 1e-12, "F[{i}][{j}]");
+            }
+        }
+    }
+
+    /// One step equals two: the flow property, F(a + b) = F(b) F(a) and Q(a + b) = F(b) Q(a) F(b)ᵀ + Q(b).
+    #[test]
+    fn splitting_a_step_changes_nothing(
+        time in -3.0..3.0_f64, tau in -3.0..6.0_f64, first in -4.0..1.0_f64, second in -4.0..1.0_f64,
+    ) {
+        let motion = Motion::ornstein_uhlenbeck(10_f64.powf(time), 0.3, 0.0, f64::INFINITY).unwrap();
+        let branches = [branch(10_f64.powf(tau))];
+        let at = |dt: f64| {
+            let response = Response::new(&motion, &branches, dt);
+            let mut f = SMatrix::<f64, 3, 3>::identity();
+            for j in 0..2 {
+                for i in 0..2 {
+                    f[(i, j)] += response.motion_change[i][j];
+                }
+                f[(2, j)] = response.drive[0][j];
+            }
+            f[(2, 2)] += response.decay_change[0];
+            let (_, _, noise) = collect::<f64, 1, 3>(&response);
+            (f, SMatrix::<f64, 3, 3>::from_fn(|i, j| noise[i][j]))
+        };
+        let (a, b) = (10_f64.powf(first), 10_f64.powf(second));
+        let ((f1, q1), (f2, q2), (f, q)) = (at(a), at(b), at(a + b));
+        let (f_split, q_split) = (f2 * f1, f2 * q1 * f2.transpose() + q2);
+        for i in 0..3 {
+            for j in 0..3 {
+                let scale = (q[(i, i)] * q[(j, j)]).sqrt();
+                prop_assert!((q_split[(i, j)] - q[(i, j)]).abs() <= 1e-12 * scale, "Q[{i}][{j}]");
+                // F's entries are at most the length of the step, or 1.
+                prop_assert!((f_split[(i, j)] - f[(i, j)]).abs() <= 1e-13 * (1.0 + a + b), "F[{i}][{j}]");
             }
         }
     }

@@ -2,7 +2,7 @@ use std::mem;
 
 use ohmstrain_calib::{
     CalibrationError, Confounded, Distrusted, GaugeFamily, LawOptions, LeftOutRow, RECIPE, Samples, Stage,
-    TemperatureCoefficients, TemperatureFit, calibrate_with_prior, fit_temperature,
+    TemperatureCoefficients, TemperatureFit, fit_temperature,
 };
 use ohmstrain_sensor::{EstimatorKind, Findings, RecordingInfo, SensorParams};
 
@@ -201,7 +201,7 @@ impl<'a> Calibration<'a> {
             return Err(Error::OtherMake { of_make, found: quantity });
         }
         let mut calibration =
-            calibrate_with_prior(&samples, &self.structures(estimator), &[estimator], prior, progress)?;
+            ohmstrain_calib::calibrate(&samples, &self.structures(estimator), &[estimator], prior, progress)?;
         let (distrusted, findings) = (mem::take(&mut calibration.distrusted), calibration.findings.clone());
         let rest_readings = calibration.rest_readings.clone();
         let left_out = mem::take(&mut calibration.left_out);

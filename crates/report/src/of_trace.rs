@@ -46,6 +46,7 @@ pub struct Estimated {
 
 /// Reason why a recording has no estimates, or no report.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ReportingError {
     /// No filter can be built.
     #[error(transparent)]

@@ -143,7 +143,7 @@ fn handicap(kind: EstimatorKind) -> f64 {
     if kind.has_phases() { 0.0 } else { LOCK_IN }
 }
 
-/// Calibrates once, with or without a prior; see [`calibrate_with_prior`](with_prior::calibrate_with_prior).
+/// Calibrates once, with or without a prior; see [`calibrate`](with_prior::calibrate).
 pub(crate) fn calibrate_once(
     recordings: &[Samples],
     structures: &[LawOptions],

@@ -25,7 +25,7 @@ const ALONE: f64 = 1.0 / 3.0;
 /// # Errors
 /// If the recordings are too short or vary too little to learn a law from, if the law explains nothing, or if `structures` or `kinds` is
 /// empty.
-pub fn calibrate_with_prior(
+pub fn calibrate(
     recordings: &[Samples],
     structures: &[LawOptions],
     kinds: &[EstimatorKind],

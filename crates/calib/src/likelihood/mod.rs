@@ -5,7 +5,7 @@
 //! maximum, standard errors and profile intervals. [`LikelihoodProblem`] does the same for a sensor with a known law.
 //!
 //! The likelihood relies on the model. If the law is wrong by more than its noise allows for, the filter becomes overconfident, which
-//! readings alone do not show. If a reference exists, [`calibrate_with_prior`](crate::calibrate_with_prior) is better.
+//! readings alone do not show. If a reference exists, [`calibrate`](crate::calibrate) is better.
 //!
 //! # Policy
 //! - Parameters are positive and bounded; one that ends on a bound is reported as such and has no standard error.

@@ -50,7 +50,7 @@ pub struct MarkedReference {
 /// # Errors
 /// [`CalibrationError::Unsupported`] if there are not as many lists as recordings, [`CalibrationError::Marks`] if marks contradict each
 /// other or lie outside of their recording, and as
-/// [`calibrate_with_prior`](crate::calibrate_with_prior) if no law explains the motion.
+/// [`calibrate`](crate::calibrate) if no law explains the motion.
 pub fn marked_references(
     recordings: &[Samples],
     marks: &[Vec<Mark>],

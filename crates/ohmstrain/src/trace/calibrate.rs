@@ -14,6 +14,7 @@ const NAMED_ROWS: usize = 5;
 
 /// Reason why recordings do not give a sensor.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum Refusal {
     /// A recording does not suit a calibration.
     #[error(transparent)]
