@@ -389,7 +389,7 @@ examples() {
 
     arm-none-eabi-gcc "${build[@]}" "${strict[@]}" -I"$here/stm32" -I"$folder/src" -c "$example/ohmstrain_app.c" -o "$work/app.o"
     arm-none-eabi-gcc "${build[@]}" -std=c99 -ffp-contract=off -Wall -Wextra -Werror -I"$here/stm32" -I"$here" -I"$work" -I"$folder/src" \
-        -I"$example" "${link[@]}" "$work/app.o" "$folder/src/ohmstrain.c" "$here/stm32/board.c" "$here/board.c" -lm -o "$work/hal.elf"
+        -I"$example" "${link[@]}" "$work/app.o" "$folder/src/ohmstrain.c" "$here/stm32/board.c" "$here/stm32/hal.c" "$here/board.c" -lm -o "$work/hal.elf"
     qemu "$work/hal.elf" >"$work/hal.csv" 2>&1
     found=$(as_replayed "$work/hal.csv")
     say "$name, STM32 HAL example" "stand-in for the HAL, Cortex-M4F: $found"

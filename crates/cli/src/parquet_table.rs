@@ -1,6 +1,5 @@
 //! Tables as Parquet: optional columns of numbers and of text, row by row.
 
-use std::fs::File;
 use std::io::{self, Write};
 use std::sync::Arc;
 
@@ -8,11 +7,9 @@ use parquet::basic::{Compression, LogicalType, Repetition, Type as PhysicalType}
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType};
 use parquet::errors::ParquetError;
 use parquet::file::properties::WriterProperties;
-use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
-use parquet::schema::types::{Type, TypePtr};
+use parquet::schema::types::Type;
 
-use crate::output::is_this_program;
 use ohmstrain::MADE_BY;
 
 /// Number of rows that are buffered until they are written.
@@ -117,15 +114,6 @@ impl Cells {
         }
         column.close()
     }
-}
-
-/// Returns the names of the columns of a table that this program wrote; `None` for any other file.
-pub fn columns_of_ours(file: File) -> Option<Vec<String>> {
-    let reader = SerializedFileReader::new(file).ok()?;
-    let metadata = reader.metadata().file_metadata();
-    let is_ours = metadata.created_by().is_some_and(is_this_program);
-    let name = |field: &TypePtr| field.name().to_owned();
-    is_ours.then(|| metadata.schema().get_fields().iter().map(name).collect())
 }
 
 /// Returns the error of the underlying writer, so that a closed pipe stays one.

@@ -7,6 +7,7 @@ use serde::Deserialize;
 use wasm_bindgen::prelude::*;
 
 use crate::doubts::on_one_clock;
+use crate::estimator::estimator;
 use crate::json::{json, parsed, refused};
 use crate::recording::Recording;
 use crate::sensor::Sensor;
@@ -47,11 +48,6 @@ impl Choices {
         let family: Result<GaugeFamily, String> = wanted.parse();
         Ok(calibration.gauge(family.map_err(|expected| format!("gauge: {expected}, found `{wanted}`"))?))
     }
-}
-
-/// Returns an estimator by its name.
-pub fn estimator(name: &str) -> Result<EstimatorKind, String> {
-    name.parse().map_err(|expected| format!("estimator: {expected}, found `{name}`"))
 }
 
 /// Result of a calibration.

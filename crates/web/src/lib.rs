@@ -11,6 +11,7 @@ mod answers;
 mod calibration;
 mod doubts;
 mod estimates;
+mod estimator;
 mod example;
 mod files;
 mod firmware;

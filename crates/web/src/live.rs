@@ -4,7 +4,7 @@ use ohmstrain::Column;
 use serde::Deserialize;
 use wasm_bindgen::prelude::*;
 
-use crate::calibration::estimator;
+use crate::estimator::estimator;
 use crate::json::{json, refused};
 
 /// Options of a filter; each has a default.

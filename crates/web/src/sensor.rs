@@ -4,8 +4,8 @@ use ohmstrain::{EstimatorKind, Tested};
 use serde::Serialize;
 use wasm_bindgen::prelude::*;
 
-use crate::calibration::estimator;
 use crate::estimates::{self, Estimates};
+use crate::estimator::estimator;
 use crate::firmware::{self, Firmware};
 use crate::json::{json, parsed, refused};
 use crate::live::{Filter, Wishes};

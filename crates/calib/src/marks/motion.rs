@@ -4,7 +4,7 @@ use nalgebra::DVector;
 
 use crate::marks::Mark;
 use crate::marks::holds::Stillness;
-use crate::marks::pace::{INNER_KNOTS, Pace};
+use crate::marks::pace::{INNER_KNOTS, Pace, progress};
 use crate::samples::Samples;
 
 /// Default standard deviation of a mark's time, s: a person's reaction time.
@@ -17,14 +17,6 @@ const STRAIN_SD: f64 = 0.02;
 const SHAPE_SD: f64 = 0.03;
 /// Minimum duration of a move, s.
 const SHORTEST_S: f64 = 1e-3;
-
-/// Returns the progress of a move, 0 to 1, at the fraction `u` of its time: from constant speed (`shape` 0) to minimum jerk (1).
-///
-/// Source of minimum jerk: Flash and Hogan, *J. Neurosci.* 5 (1985) 1688.
-pub(crate) fn progress(u: f64, shape: f64) -> f64 {
-    let smooth = u.powi(3) * (10.0 + u * (6.0 * u - 15.0));
-    u + shape * (smooth - u)
-}
 
 /// A mark, or the hold around it, with standard deviations.
 #[derive(Clone, Copy, Debug)]

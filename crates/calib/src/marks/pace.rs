@@ -1,6 +1,5 @@
-//! Pace of an irregular move.
+//! Progress of a move: the common velocity profile, and the pace of an irregular move.
 
-use crate::marks::motion::progress;
 use crate::order::extent;
 use crate::samples::Samples;
 
@@ -11,6 +10,14 @@ const KNOT_SD: f64 = 0.15;
 const LEAST_CHANGE: f64 = 0.08;
 /// Weight of the readings' activity, as opposed to time, in the placement of knots.
 const BY_ACTIVITY: f64 = 0.8;
+
+/// Returns the progress of a move, 0 to 1, at the fraction `u` of its time: from constant speed (`shape` 0) to minimum jerk (1).
+///
+/// Source of minimum jerk: Flash and Hogan, *J. Neurosci.* 5 (1985) 1688.
+pub(crate) fn progress(u: f64, shape: f64) -> f64 {
+    let smooth = u.powi(3) * (10.0 + u * (6.0 * u - 15.0));
+    u + shape * (smooth - u)
+}
 
 /// Pace of an irregular move: the mean of the common progress and that of the readings, plus a deviation that is linear between knots.
 /// Knots are dense where the readings move.

@@ -7,11 +7,9 @@ use ohmstrain::{Calibrated, Calibration, Closing, Findings, Sensor, Tested};
 use super::closing;
 use super::explain;
 use super::fleet;
-use super::hand;
 use super::reporting::{Wanted, drawn};
 use crate::alignment;
 use crate::args::{CalibrateArgs, Coefficients};
-use crate::channels::Table;
 use crate::error::CliError;
 use crate::input;
 use crate::marks;
@@ -23,10 +21,6 @@ use ohmstrain_report::{Reporting, Sample, Scored};
 
 /// Calibrates a sensor on recordings, writes its parameters, and prints a summary.
 pub fn run(args: &CalibrateArgs, messages: &Messages) -> Result<(), CliError> {
-    let tables: Option<Vec<Table>> = args.traces.iter().map(|path| Table::read(path)).collect::<Result<_, _>>()?;
-    if let Some(tables) = tables {
-        return hand::calibrate::run(args, &tables, messages);
-    }
     let outcome = calibrate(args, messages)?;
     let file = args.output.display().to_string();
     let closing = outcome.closing(&file);

@@ -4,8 +4,6 @@ use ohmstrain_bench_data::Metadata;
 
 use crate::args::ExportArgs;
 use crate::commands::export_choice::{self, Choice};
-use crate::commands::hand;
-
 use crate::commands::export_score::{OnRecording, print_promise};
 use crate::error::CliError;
 use crate::input;
@@ -15,9 +13,6 @@ use ohmstrain_export::{self as export, Compared, ExportError, Promise, SourceFil
 
 /// Writes a sensor's filter as source code.
 pub fn run(args: &ExportArgs) -> Result<(), CliError> {
-    if sensor_file::is_of_a_hand(&args.sensor) {
-        return hand::export::run(args, &args.sensor);
-    }
     let asked = args.estimator.chosen();
     if let Some(other) = asked.filter(|kind| !export::FILTERS.contains(kind)) {
         let message = "--estimator: expected corrected, sign-split, hypotheses or ekf, found";

@@ -28,8 +28,10 @@ mod simulate;
 mod smooth;
 
 use crate::args::Command;
+use crate::channels::Table;
 use crate::error::CliError;
 use crate::messages::Messages;
+use crate::sensor_file;
 
 /// Runs a command.
 pub fn dispatch(command: &Command, messages: &Messages) -> Result<(), CliError> {
@@ -40,7 +42,12 @@ pub fn dispatch(command: &Command, messages: &Messages) -> Result<(), CliError> 
         Command::Inspect(args) => inspect::run(args),
         Command::Import(args) => import::run(args, messages),
         Command::Simulate(args) => simulate::run(args),
-        Command::Calibrate(args) => calibrate::run(args, messages),
+        Command::Calibrate(args) => {
+            match args.traces.iter().map(|path| Table::read(path)).collect::<Result<Option<Vec<Table>>, _>>()? {
+                Some(tables) => hand::calibrate::run(args, &tables, messages),
+                None => calibrate::run(args, messages),
+            }
+        }
         Command::Record(args) => record::run(args, messages),
         Command::Refine(args) => refine::run(args, messages),
         Command::FitLaw(args) => fit_law::run(args, messages),
@@ -52,6 +59,7 @@ pub fn dispatch(command: &Command, messages: &Messages) -> Result<(), CliError> 
         Command::Evaluate(args) => evaluate::run(args, messages),
         Command::Batch(args) => batch::run(args, messages),
         Command::Fleet(args) => fleet::run(args, messages),
+        Command::Export(args) if sensor_file::is_of_a_hand(&args.sensor) => hand::export::run(args, &args.sensor),
         Command::Export(args) => export::run(args),
         Command::SerialCheck(args) => serial_check::run(args),
         Command::Completions(args) => shell::completions(args),

@@ -2,11 +2,12 @@ use std::fs::{self, File, OpenOptions, Permissions};
 use std::io::{self, BufReader, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::schema::types::TypePtr;
 use serde_json::Value;
 
 use super::kind::{Kind, is_this_program};
 use super::unfinished::{Unfinished, folder_of, publish, sync_folder};
-use crate::parquet_table;
 
 /// Identity of a file in the system, independent of its name.
 #[derive(Debug, PartialEq, Eq)]
@@ -101,7 +102,7 @@ impl Destination {
         let mut head = Vec::new();
         (&file).take(HEAD).read_to_end(&mut head)?;
         if head.starts_with(b"PAR1") {
-            return Ok(!parquet_table::columns_of_ours(file).is_some_and(|names| kind.has_columns(&names, own)));
+            return Ok(!columns_of_ours(file).is_some_and(|names| kind.has_columns(&names, own)));
         }
         if kind == Kind::Summary && head.starts_with(b"[") {
             file.rewind()?;
@@ -153,6 +154,15 @@ impl Destination {
         io::copy(&mut File::open(draft)?, &mut file)?;
         publish(unfinished.into_iter().collect()).map_err(|(_, error)| error)
     }
+}
+
+/// Returns the names of the columns of a table that this program wrote; `None` for any other file.
+fn columns_of_ours(file: File) -> Option<Vec<String>> {
+    let reader = SerializedFileReader::new(file).ok()?;
+    let metadata = reader.metadata().file_metadata();
+    let is_ours = metadata.created_by().is_some_and(is_this_program);
+    let name = |field: &TypePtr| field.name().to_owned();
+    is_ours.then(|| metadata.schema().get_fields().iter().map(name).collect())
 }
 
 /// True if this is JSON of this program: objects that have all these fields and name the program.

@@ -14,11 +14,11 @@ the strain is known, ``strain``, ``displacement_mm`` or ``angle_deg``. Missing v
 
 from . import plot
 from ._core import MADE_BY, OhmstrainError
-from ._evaluation import Evaluation, Scores, evaluate
+from ._evaluation import Evaluation, Scores
 from ._fused import FusedFilter, FusedSensor
 from ._hand import Hand, HandFilter
 from ._read import read
-from ._sensor import LaggedFilter, LiveFilter, OhmstrainWarning, Prior, Sensor, calibrate
+from ._sensor import LaggedFilter, LiveFilter, OhmstrainWarning, Prior, Sensor, calibrate, evaluate
 
 __version__ = MADE_BY.split()[-1]
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
-from . import _core, _tables
-from ._sensor import Sensor, _choices, _split, _warn
+if TYPE_CHECKING:
+    from . import Sensor
 
 
 @dataclass(frozen=True)
@@ -67,34 +67,3 @@ class Evaluation:
                 f"{of:16}{scores.rmse_percent_fs:8.2f}{scores.rmse:10.4f}{scores.bias:+10.4f}  {shares}".rstrip()
             )
         return "\n".join(lines)
-
-
-def evaluate(
-    recording: Any, *, splits: Iterable[float] = (0.5,), estimator: str = "auto", **about: Any
-) -> list[Evaluation]:
-    """Calibrate on the first rows of a recording, score the rest, and compare with four baselines.
-
-    Parameters
-    ----------
-    recording
-        A table with a reference.
-    splits
-        Shares of the rows used for calibration, between 0 and 1.
-    estimator : str
-        As in :func:`calibrate`.
-
-    Returns
-    -------
-    list of Evaluation
-        One per split, with the scores of ``ohmstrain evaluate --splits``.
-    """
-    about, _ = _split(dict(about))
-    table = _tables.to_arrow(recording)
-    evaluations = []
-    for share in splits:
-        core, doubts, scored = _core.evaluate_split(table, about, _choices(estimator), share)
-        _warn(doubts)
-        evaluation = Evaluation(scored, about["name"], share)
-        evaluation.sensor = Sensor(core)
-        evaluations.append(evaluation)
-    return evaluations

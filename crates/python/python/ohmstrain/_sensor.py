@@ -1,4 +1,4 @@
-"""Sensors and filters."""
+"""Sensors and filters, their calibration and its test."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from . import _core, _tables
+from ._evaluation import Evaluation
 
 
 class OhmstrainWarning(UserWarning):
@@ -272,8 +273,6 @@ class Sensor:
         -------
         Evaluation
         """
-        from ._evaluation import Evaluation
-
         about, options = _split(options)
         scored = self._core.evaluate(_tables.to_arrow(recording), about, _options(**options), from_s)
         return Evaluation(scored, about["name"], None)
@@ -508,3 +507,34 @@ def calibrate(
     core, doubts = _core.calibrate(tables, _choices(estimator, branches, gauge, prior, align, temperature))
     _warn(doubts)
     return Sensor(core)
+
+
+def evaluate(
+    recording: Any, *, splits: Iterable[float] = (0.5,), estimator: str = "auto", **about: Any
+) -> list[Evaluation]:
+    """Calibrate on the first rows of a recording, score the rest, and compare with four baselines.
+
+    Parameters
+    ----------
+    recording
+        A table with a reference.
+    splits
+        Shares of the rows used for calibration, between 0 and 1.
+    estimator : str
+        As in :func:`calibrate`.
+
+    Returns
+    -------
+    list of Evaluation
+        One per split, with the scores of ``ohmstrain evaluate --splits``.
+    """
+    about, _ = _split(dict(about))
+    table = _tables.to_arrow(recording)
+    evaluations = []
+    for share in splits:
+        core, doubts, scored = _core.evaluate_split(table, about, _choices(estimator), share)
+        _warn(doubts)
+        evaluation = Evaluation(scored, about["name"], share)
+        evaluation.sensor = Sensor(core)
+        evaluations.append(evaluation)
+    return evaluations

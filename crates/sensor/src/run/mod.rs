@@ -7,6 +7,7 @@ pub(crate) mod corrected;
 pub(crate) mod known;
 pub(crate) mod learned;
 pub(crate) mod options;
+mod pending;
 pub(crate) mod portable;
 mod remembering;
 mod running;

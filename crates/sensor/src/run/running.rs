@@ -13,6 +13,7 @@ use crate::run::backward::{Backward, KeptStep};
 use crate::run::clock::{Clock, floored};
 use crate::run::learned::{Learned, OfFilter};
 use crate::run::options::Options;
+use crate::run::pending::{LiveStep, Pending, Reported};
 use crate::run::remembering::Remembering;
 use crate::run::stored::{Stored, Waiting};
 use crate::run::turns::Turns;
@@ -21,9 +22,6 @@ use crate::run::{Filter, Output};
 /// The live filter on a computer.
 pub(crate) type Live<E, const N: usize, const L: usize> =
     LiveFilter<f64, Remembering<E, <E as Estimator<f64, N, L>>::Prepared>, SharedCorrection, N, L>;
-/// Data of a row in the forward pass.
-pub(crate) type LiveStep<E, const N: usize, const L: usize> =
-    KeptStep<Remembering<E, <E as Estimator<f64, N, L>>::Prepared>, N, L>;
 
 /// A row, and the data of its step that a smoother needs.
 pub(crate) type KeptRow<E, const N: usize, const L: usize> =
@@ -84,24 +82,6 @@ impl<const B: usize, const N: usize> Reports<B, N> {
             rest_off: 0.0,
         }
     }
-}
-
-/// A row whose estimate waits for later readings.
-pub(crate) struct Pending<E: SensorEstimator<f64, N, L>, const N: usize, const L: usize> {
-    pub time_s: f64,
-    pub reported: Reported,
-    pub row: LiveStep<E, N, L>,
-}
-
-/// A row as it was reported when it came.
-#[derive(Clone, Copy)]
-pub(crate) struct Reported {
-    pub measured: Measured<f64>,
-    /// The corrected strain before doubts, and the ratio of observed to stated innovation variance; `None` without a
-    /// correction.
-    pub corrected: Option<(Gaussian<f64>, f64)>,
-    pub doubts: Doubts<f64>,
-    pub rest_off: f64,
 }
 
 impl<E, const B: usize, const N: usize, const L: usize> Running<E, B, N, L>

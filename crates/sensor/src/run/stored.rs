@@ -8,8 +8,8 @@ use toml::{Value, de, ser};
 
 use crate::run::backward::KeptStep;
 use crate::run::clock::Clock;
+use crate::run::pending::{LiveStep, Pending, Reported};
 use crate::run::remembering::Remembering;
-use crate::run::running::{LiveStep, Pending, Reported};
 
 /// State on which the next row depends. Prepared steps are not stored, because they follow from their lengths. States of estimators
 /// are already TOML here; otherwise a program would contain this code once for each state type.

@@ -7,7 +7,8 @@ use ohmstrain_ekf::live::{Measured, Memory, SensorEstimator};
 use crate::run::backward::Backward;
 use crate::run::clock::Clock;
 use crate::run::corrected::CorrectedWayBack;
-use crate::run::running::{LiveStep, Running};
+use crate::run::pending::LiveStep;
+use crate::run::running::Running;
 use crate::run::turns::Turns;
 use crate::run::{Output, Rows, SEGMENT, Smoother, WayBack};
 

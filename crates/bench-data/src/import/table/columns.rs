@@ -2,7 +2,6 @@ use crate::Metadata;
 use crate::error::quote;
 use crate::import::bytes::Cells;
 use crate::import::table::grid::MONITOR_CLOCK;
-use crate::import::table::select::RowFilter;
 use crate::import::table::value::number_of;
 use crate::import::words::{DecimalMark, names};
 
@@ -25,19 +24,6 @@ impl Column {
         let (name, own) = names::take_apart(&heading);
         Self { name, heading, unit: unit.or(own), cells }
     }
-}
-
-/// Properties of a file that are given in advance; others are inferred.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct ReadOptions {
-    /// The decimal mark.
-    pub decimal: Option<DecimalMark>,
-    /// Number of lines above header and data.
-    pub skip: Option<usize>,
-    /// The sheet of a workbook.
-    pub sheet: Option<String>,
-    /// Filters of rows; a row must pass all of them.
-    pub rows: Vec<RowFilter>,
 }
 
 /// Format of a file.

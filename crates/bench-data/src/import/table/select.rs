@@ -1,40 +1,15 @@
 //! Selection of a table's rows: those with a given value in a column, and those of one range.
 
-use std::fmt;
 use std::ops::Range;
-use std::str::FromStr;
 
 use crate::error::quote;
 use crate::import::bytes::Cells;
 use crate::import::error::ImportError;
 use crate::import::table::columns::{Column, Table};
+use crate::import::table::options::RowFilter;
 
 /// Largest number of values of a column that a message lists.
 const MOST_VALUES: usize = 8;
-
-/// Filter for rows with a given value in a column: `trial=2`.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct RowFilter {
-    /// Heading, name or number (from 1) of the column.
-    pub column: String,
-    /// Value of the column in those rows.
-    pub value: String,
-}
-
-impl fmt::Display for RowFilter {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(out, "{}={}", self.column, self.value)
-    }
-}
-
-impl FromStr for RowFilter {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let (column, value) = text.split_once('=').ok_or("expected COLUMN=VALUE")?;
-        Ok(Self { column: column.trim().to_owned(), value: value.trim().to_owned() })
-    }
-}
 
 impl Table {
     /// Returns the column with this heading, name or number.

@@ -1,7 +1,5 @@
 //! Kinds of a quantity that its name distinguishes: a resistance or its inverse, a strain or a stretch ratio, a ratio or a change.
 
-use crate::import::words::names::is_among;
-
 /// Converts a name to lower case, without accents, with plain digits and one kind of delta. Umlauts stay: they are letters.
 pub(crate) fn folded(name: &str) -> String {
     const PLAIN: [(&str, char); 9] = [
@@ -17,6 +15,11 @@ pub(crate) fn folded(name: &str) -> String {
     ];
     let plain = |c: char| PLAIN.iter().find(|(accented, _)| accented.contains(c)).map_or(c, |(_, plain)| *plain);
     name.trim().to_lowercase().chars().map(plain).collect()
+}
+
+/// True if a word is in a comma-separated list.
+pub(crate) fn is_among(list: &str, word: &str) -> bool {
+    list.split(',').any(|known| known == word)
 }
 
 /// True if the name of a column denotes the inverse of a resistance.

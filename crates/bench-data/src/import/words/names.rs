@@ -1,4 +1,4 @@
-use crate::import::words::kinds::{folded, is_conductance};
+use crate::import::words::kinds::{folded, is_among, is_conductance};
 use crate::import::words::role::Role;
 use crate::import::words::units;
 
@@ -38,11 +38,6 @@ pub(crate) fn take_apart(heading: &str) -> (String, Option<String>) {
 fn cased(name: &str, unit: &str) -> String {
     let is_siemens = is_conductance(name) && matches!(unit.trim_start_matches(['m', 'u', 'µ', 'μ', 'n']), "s" | "S");
     if is_siemens { unit.replace('s', "S") } else { unit.to_owned() }
-}
-
-/// True if a word is in a comma-separated list.
-pub(crate) fn is_among(list: &str, word: &str) -> bool {
-    list.split(',').any(|known| known == word)
 }
 
 /// True if a text numbers columns of one kind: `strain_1`, `R (2)`.

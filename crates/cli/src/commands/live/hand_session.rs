@@ -5,12 +5,11 @@ use std::time::Instant;
 
 use ohmstrain::trace::HandDescription;
 use ohmstrain_bench_data::{Metadata, Row};
-use ratatui::Frame;
 
+use super::Shown;
 use super::recorder::Recorder;
 use super::session::recorded;
 use super::track::{LEAST_AT_REST, REST_S, Timed, Track};
-use super::{Shown, hand_view};
 use crate::args::LiveArgs;
 use crate::commands::hand::joint::{Channel, Joint, JointRow};
 use crate::commands::hand::lines::{HandParser, channels};
@@ -187,9 +186,5 @@ impl Shown for HandSession<'_> {
         let all = "R0 of each channel is its median of the last second";
         self.track.message = if refused.is_empty() { all.into() } else { refused.join("; ") };
         Ok(())
-    }
-
-    fn picture(&self, frame: &mut Frame, status: &str) {
-        hand_view::draw(frame, self, status);
     }
 }

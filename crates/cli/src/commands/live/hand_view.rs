@@ -7,6 +7,7 @@ use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::GraphType;
 
+use super::Pictured;
 use super::hand_session::HandSession;
 use super::view::{Around, MOST_DRAWN, of_stream};
 use crate::chart::{chart, dataset};
@@ -17,10 +18,11 @@ const COLOURS: [Color; 6] = [Color::Cyan, Color::Magenta, Color::Green, Color::B
 /// Width of a joint's name in columns.
 const NAME: usize = 11;
 
-/// Draws everything.
-pub fn draw(frame: &mut Frame, session: &HandSession, status: &str) {
-    let around = Around { args: session.args, status, message: &session.track.message };
-    around.draw(frame, numbers(session), |frame, area| draw_plot(frame, session, area));
+impl Pictured for HandSession<'_> {
+    fn picture(&self, frame: &mut Frame, status: &str) {
+        let around = Around { args: self.args, status, message: &self.track.message };
+        around.draw(frame, numbers(self), |frame, area| draw_plot(frame, self, area));
+    }
 }
 
 /// Returns the factor and the unit in which a joint is shown.

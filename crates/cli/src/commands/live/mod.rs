@@ -47,9 +47,6 @@ trait Shown: Taker {
     /// Takes the sensors as rested now.
     fn zero(&mut self) -> Result<(), CliError>;
 
-    /// Draws the view; `status` is the state of the port.
-    fn picture(&self, frame: &mut Frame, status: &str);
-
     /// Starts or stops recording.
     fn toggle_record(&mut self) {
         let has_rows = self.track().pulse.counts.rows > 0;
@@ -77,7 +74,13 @@ trait Shown: Taker {
     }
 }
 
-impl<S: Shown> Screen for S {
+/// The view of a stream.
+trait Pictured {
+    /// Draws everything; `status` is the state of the port.
+    fn picture(&self, frame: &mut Frame, status: &str);
+}
+
+impl<S: Shown + Pictured> Screen for S {
     fn is_done(&mut self, _: bool) -> Result<bool, CliError> {
         Ok(false)
     }
@@ -115,7 +118,7 @@ pub fn run(args: &LiveArgs, messages: &Messages) -> Result<(), CliError> {
     watch(&mut Session::new(args, sensor)?, args, messages)
 }
 
-fn watch<S: Shown>(session: &mut S, args: &LiveArgs, messages: &Messages) -> Result<(), CliError> {
+fn watch<S: Shown + Pictured>(session: &mut S, args: &LiveArgs, messages: &Messages) -> Result<(), CliError> {
     let mut feed = Feed::open(&args.port)?;
     let shown = screen::show(&mut feed, session);
     session.recording().iter().for_each(|message| messages.remark(message));

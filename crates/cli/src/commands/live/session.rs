@@ -8,11 +8,10 @@ use ohmstrain::number::significant;
 use ohmstrain::trace::{self, check_unit};
 use ohmstrain::{Error, Estimate, Filter, QuietWatch, Sensor, Thermometer, ValidityWatch};
 use ohmstrain_bench_data::{Line, LineParser, ReadingKind, ReferenceQuantity, Row};
-use ratatui::Frame;
 
+use super::Shown;
 use super::recorder::Recorder;
 use super::track::{LEAST_AT_REST, REST_S, Timed, Track};
-use super::{Shown, view};
 use crate::args::{LiveArgs, RestResistance};
 use crate::error::CliError;
 use crate::port::{Due, Headed, Taker};
@@ -38,7 +37,7 @@ impl Timed for Point {
 
 /// A filter on a stream of lines.
 pub struct Session<'a> {
-    args: &'a LiveArgs,
+    pub args: &'a LiveArgs,
     /// The sensor, on the joint of the last header that named one.
     calibrated: Sensor,
     /// The same for the stream's columns.
@@ -280,9 +279,5 @@ impl Shown for Session<'_> {
         self.filter = at_zero.unwrap_or(wanted.build()?);
         self.track.message = format!("R0 is {} now, the median of {count} readings{starts}", significant(rest, 5));
         Ok(())
-    }
-
-    fn picture(&self, frame: &mut Frame, status: &str) {
-        view::draw(frame, self, status, self.args);
     }
 }

@@ -10,6 +10,7 @@ use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, GraphType, Paragraph, Wrap};
 
+use super::Pictured;
 use super::pulse::Pulse;
 use super::recorder::Recorder;
 use super::session::Session;
@@ -28,10 +29,11 @@ pub const MOST_DRAWN: usize = 2000;
 /// Width of a bar that stands for a probability.
 const BAR: usize = 10;
 
-/// Draws everything.
-pub fn draw(frame: &mut Frame, session: &Session, status: &str, args: &LiveArgs) {
-    let around = Around { args, status, message: &session.track.message };
-    around.draw(frame, numbers(session), |frame, area| draw_plot(frame, session, args.window_s, area));
+impl Pictured for Session<'_> {
+    fn picture(&self, frame: &mut Frame, status: &str) {
+        let around = Around { args: self.args, status, message: &self.track.message };
+        around.draw(frame, numbers(self), |frame, area| draw_plot(frame, self, self.args.window_s, area));
+    }
 }
 
 /// Text around a plot.
