@@ -59,8 +59,8 @@ impl CliError {
     }
 
     /// Creates the error of a calibration that failed on the contents of `files`.
-    pub fn calibration(files: &[&str], error: &CalibrationError) -> Self {
-        Refusal::calibration(files, error.clone()).into()
+    pub fn calibration(files: &[&str], error: CalibrationError) -> Self {
+        Refusal::calibration(files, error).into()
     }
 
     /// Adds the input's name to an error about its contents.

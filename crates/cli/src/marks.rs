@@ -105,7 +105,7 @@ pub fn take(recordings: &mut [TraceFile], marked: &[Marked]) -> Result<Vec<Strin
             CliError::Input(marked[recording].fault(&source))
         }
         Error::Calibration(error) => {
-            CliError::calibration(&names.iter().map(String::as_str).collect::<Vec<_>>(), &error)
+            CliError::calibration(&names.iter().map(String::as_str).collect::<Vec<_>>(), error)
         }
         other => other.into(),
     })?;

@@ -17,7 +17,7 @@ pub fn text(args: &CalibrateArgs, recordings: &[TraceFile], law: &LawParams) -> 
     let mut text = String::new();
     let samples: Vec<Samples> = recordings.iter().map(TraceFile::samples).collect::<Result<_, _>>()?;
     let names: Vec<&str> = recordings.iter().map(|recording| recording.name.as_str()).collect();
-    let failed = |error| CliError::calibration(&names, &error);
+    let failed = |error| CliError::calibration(&names, error);
     let screened = screen(&samples).map_err(failed)?;
     let samples = screened.samples();
     if args.explain {

@@ -186,7 +186,7 @@ fn calibrated(
     };
     let samples: Vec<Samples> = training.iter().map(|one| one.samples()).collect::<Result<_, _>>()?;
     let names: Vec<&str> = training.iter().map(|recording| recording.name.as_str()).collect();
-    let failed = |error| CliError::calibration(&names, &error);
+    let failed = |error| CliError::calibration(&names, error);
     let baselines = Baselines::fit(&screen(&samples).map_err(failed)?.samples()).map_err(failed)?;
     let phases: Vec<_> = samples.iter().map(|samples| phases(samples.time_s(), samples.strain())).collect();
     let published = PublishedLaw::fit(&samples, &phases).ok();

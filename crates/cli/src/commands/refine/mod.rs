@@ -42,7 +42,7 @@ pub fn run(args: &RefineArgs, messages: &Messages) -> Result<(), CliError> {
     let rows = RelativeRows::new(&recording, args.from, args.until, sensor.rest_reading(rest))?;
     let mut params = sensor.into_params();
     let (start, free) = start(args, &params, &rows.time_s)?;
-    let refinement = refine(&params.law, start, free, &rows, messages).map_err(|error| named(args, &error))?;
+    let refinement = refine(&params.law, start, free, &rows, messages).map_err(|error| named(args, error))?;
     remark_on_input(&recording, &rows, &params, messages);
     replace(&mut params, &refinement);
     outputs.put(output, sensor_file::text(&sensor_file::checked(params)?)?);
@@ -56,7 +56,7 @@ pub fn run(args: &RefineArgs, messages: &Messages) -> Result<(), CliError> {
 }
 
 /// Adds the file that an error is about: the law and the start of the search come from the sensor's file.
-fn named(args: &RefineArgs, error: &CalibrationError) -> CliError {
+fn named(args: &RefineArgs, error: CalibrationError) -> CliError {
     let of_sensor = matches!(
         error,
         CalibrationError::Unsupported(_) | CalibrationError::Sensor(_) | CalibrationError::Parameter(_)
@@ -90,7 +90,7 @@ fn start(
     params: &SensorParams,
     time_s: &[f64],
 ) -> Result<(NoiseStart, Vec<NoiseParameter>), CliError> {
-    let ekf = params.estimator(EstimatorKind::Ekf).map_err(|error| named(args, &SensorError::from(error).into()))?;
+    let ekf = params.estimator(EstimatorKind::Ekf).map_err(|error| named(args, SensorError::from(error).into()))?;
     let start = NoiseStart::new(ekf, time_s);
     let movable = movable(&params.law, &start);
     let wanted: Vec<NoiseParameter> = args.parameters.iter().map(|moved| moved.0).collect();
