@@ -42,6 +42,7 @@ mod counted;
 mod device_reader;
 mod error;
 pub mod faults;
+mod headed;
 #[cfg(feature = "import")]
 pub mod import;
 mod line_parser;
@@ -65,6 +66,7 @@ pub use clock::{LastTime, Microseconds};
 pub use counted::counted;
 pub use device_reader::{DeviceReader, DeviceRow};
 pub use error::{BadContent, SpecError, TraceError};
+pub use headed::Headed;
 pub use line_parser::{Line, LineParser};
 pub use metadata::{Metadata, ResistanceUnit, StrainUnit};
 #[cfg(feature = "import")]

@@ -1,7 +1,7 @@
 use csv::StringRecord;
 
 use crate::clock::LastTime;
-use crate::columns::Columns;
+use crate::columns::{Column, Columns};
 use crate::error::{BadContent, Fault};
 use crate::lines::take_apart;
 use crate::metadata::Metadata;
@@ -103,6 +103,24 @@ impl LineParser {
     #[must_use]
     pub fn reference_quantity(&self) -> Option<ReferenceQuantity> {
         self.stream.as_ref().and_then(|stream| stream.parser.reference_quantity())
+    }
+
+    /// Returns the names of the columns in which rows since the last header are recorded: that of the reading, and that of the reference,
+    /// if there is one; none before the header.
+    pub fn recorded_columns(&self) -> impl Iterator<Item = &'static str> + use<> {
+        let reading = self.stream.as_ref().map(|stream| stream.columns.reading.column);
+        let reference = self.reference_quantity().map(|quantity| match quantity {
+            ReferenceQuantity::Strain => Column::Strain,
+            ReferenceQuantity::AngleDeg => Column::AngleDeg,
+        });
+        reading.into_iter().chain(reference).map(Column::name)
+    }
+
+    /// Returns the numbers of a row in these columns: the reading, as a code if it is one, and the reference.
+    pub fn recorded(&self, row: &Row) -> impl Iterator<Item = f64> + use<> {
+        let code = row.reading.code.map_or(f64::NAN, f64::from);
+        let reading = if self.has_codes() { code } else { row.reading.value };
+        std::iter::once(reading).chain(self.reference_quantity().map(|_| row.reference))
     }
 
     /// Returns the time of the last row, as in the source.

@@ -2,6 +2,8 @@
 //!
 //! Source: J. A. Nelder, R. Mead, A simplex method for function minimization, *The Computer Journal* 7 (1965) 308–313.
 
+use std::cell::Cell;
+
 /// Cost that replaces one that is not finite.
 const VERY_BAD: f64 = 1e9;
 /// Standard deviation of the corners' costs below which the search ends.
@@ -12,11 +14,25 @@ const EXPANSION: f64 = 2.0;
 const CONTRACTION: f64 = 0.5;
 const SHRINKAGE: f64 = 0.5;
 
-/// Returns the best point that Nelder-Mead finds from `start`, with a first simplex of side `step` in every direction,
-/// in at most `iterations` iterations. A cost that is not finite counts as very bad.
-pub(crate) fn nelder_mead(mut cost: impl FnMut(&[f64]) -> f64, start: &[f64], step: f64, iterations: u64) -> Vec<f64> {
+/// Evaluations per dimension in which a search has to improve; a simplex has one corner more than dimensions.
+const PATIENCE: u64 = 3;
+
+/// Limits of a search.
+#[derive(Clone, Copy)]
+pub(crate) struct Ends {
+    /// Largest number of iterations.
+    pub iterations: u64,
+    /// Least fall of the cost in [`PATIENCE`] evaluations per dimension; at 0 the search goes on.
+    pub least_gain: f64,
+}
+
+/// Returns the best point that Nelder-Mead finds from `start`, with a first simplex of side `step` in every direction. A cost that is not
+/// finite counts as very bad.
+pub(crate) fn nelder_mead(mut cost: impl FnMut(&[f64]) -> f64, start: &[f64], step: f64, ends: Ends) -> Vec<f64> {
+    let evaluations = Cell::new(0);
     let mut corner = |point: Vec<f64>| {
         let cost = cost(&point);
+        evaluations.update(|n| n + 1);
         Corner { point, cost: if cost.is_finite() { cost } else { VERY_BAD } }
     };
     let moved = (0..start.len()).map(|i| {
@@ -26,8 +42,13 @@ pub(crate) fn nelder_mead(mut cost: impl FnMut(&[f64]) -> f64, start: &[f64], st
     });
     let mut simplex: Vec<Corner> = std::iter::once(start.to_vec()).chain(moved).map(&mut corner).collect();
     sort(&mut simplex);
-    for _ in 0..iterations {
-        if spread(&simplex) < SETTLED {
+    let (mut cost_then, mut evaluations_then) = (simplex[0].cost, evaluations.get());
+    for _ in 0..ends.iterations {
+        if simplex[0].cost < cost_then - ends.least_gain {
+            (cost_then, evaluations_then) = (simplex[0].cost, evaluations.get());
+        }
+        let is_stalled = evaluations.get() >= evaluations_then + PATIENCE * start.len() as u64;
+        if spread(&simplex) < SETTLED || (ends.least_gain > 0.0 && is_stalled) {
             break;
         }
         if let Some(better) = improved(&simplex, &mut corner) {
@@ -100,13 +121,17 @@ fn spread(simplex: &[Corner]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::nelder_mead;
+    use std::cell::Cell;
+
+    use super::{Ends, PATIENCE, nelder_mead};
+
+    const TO_THE_END: Ends = Ends { iterations: 500, least_gain: 0.0 };
 
     /// The minimum at (1, 1) lies at the end of a bent valley.
     #[test]
     fn the_minimum_of_rosenbrocks_function_is_found() {
         let cost = |x: &[f64]| (1.0 - x[0]).powi(2) + 100.0 * (x[1] - x[0] * x[0]).powi(2);
-        let best = nelder_mead(cost, &[-1.2, 1.0], 0.5, 500);
+        let best = nelder_mead(cost, &[-1.2, 1.0], 0.5, TO_THE_END);
         // Costs that differ by 1e-7 belong to points whose distance is the root of that over the root of the smallest
         // curvature, about 0.4.
         assert!(best.iter().all(|x| (x - 1.0).abs() < 1e-3), "{best:?}");
@@ -115,7 +140,26 @@ mod tests {
     #[test]
     fn a_cost_that_cannot_be_computed_is_avoided() {
         let cost = |x: &[f64]| if x[0] < 0.0 { f64::NAN } else { (x[0] - 0.5).powi(2) };
-        let best = nelder_mead(cost, &[0.1], -0.3, 200);
+        let best = nelder_mead(cost, &[0.1], -0.3, TO_THE_END);
         assert!((best[0] - 0.5).abs() < 1e-3, "{best:?}");
+    }
+    /// A steep slope gains more than a tenth whenever that is asked, a gentle one never: the simplex expands, but not ten
+    /// thousandfold in nine evaluations.
+    #[test]
+    fn a_search_that_hardly_gains_ends() {
+        let evaluations = |slope: f64, least_gain: f64| {
+            let count = Cell::new(0);
+            let cost = |x: &[f64]| {
+                count.update(|n: u64| n + 1);
+                slope * (x[0] + x[1] + x[2])
+            };
+            nelder_mead(cost, &[0.0; 3], 1.0, Ends { iterations: 40, least_gain });
+            count.get()
+        };
+        assert_eq!(evaluations(-1.0, 0.1), evaluations(-1.0, 0.0));
+        // A simplex, the evaluations in which it has to gain, and the last step.
+        let most = 4 + 3 * PATIENCE + 2;
+        assert!((4 + 3 * PATIENCE..=most).contains(&evaluations(-1e-5, 0.1)));
+        assert!(evaluations(-1e-5, 0.0) >= 40);
     }
 }

@@ -1,3 +1,4 @@
+use ohmstrain::trace::median;
 use ohmstrain::{Error, FilterBuilder, Sensor};
 
 use crate::args::{EstimateArgs, RestResistance, Without};
@@ -69,14 +70,4 @@ pub fn of_first(refused: &Error, count: usize, file: &str) -> CliError {
 pub fn median_of_first(count: usize, first: impl Iterator<Item = f64>, file: &str) -> Result<f64, CliError> {
     let none = || CliError::Input(format!("{file}: expected a reading among the first rows, found none"));
     median(first.filter(|value| value.is_finite()).take(count).collect()).ok_or_else(none)
-}
-
-/// Returns the median of numbers; `None` if there are none.
-pub fn median(mut known: Vec<f64>) -> Option<f64> {
-    known.sort_by(f64::total_cmp);
-    match known.len() {
-        0 => None,
-        n if n % 2 == 1 => Some(known[n / 2]),
-        n => Some(0.5 * (known[n / 2 - 1] + known[n / 2])),
-    }
 }

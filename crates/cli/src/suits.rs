@@ -10,8 +10,6 @@ use crate::messages::Messages;
 
 /// Number of readings at the start of a file that are checked before it is filtered.
 pub const FIRST_READINGS: usize = 100;
-/// Number of first readings that are checked if a reader waits for each row.
-pub const FIRST_LIVE_READINGS: usize = 20;
 
 /// Refuses readings in another unit than the sensor's; `header` names the recording's header in messages.
 pub fn check_readings(

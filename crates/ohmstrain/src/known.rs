@@ -8,7 +8,7 @@ use crate::Error;
 use crate::estimate::Scale;
 
 /// Default standard deviation of a known strain, as a share of the limits' span.
-const KNOWN_TO: f64 = 0.005;
+pub(crate) const KNOWN_TO: f64 = 0.005;
 
 /// A strain (or angle) known at a certain time: at an end stop, a mark on the bench, or a joint in view.
 ///

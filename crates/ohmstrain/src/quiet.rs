@@ -42,7 +42,7 @@ pub struct QuietWatch {
     ends: (f64, f64),
     /// Smallest strain that is worth a question; `None` if the sensor never reports zero strain.
     worth: Option<f64>,
-    known: Vec<Known>,
+    pub(crate) known: Vec<Known>,
     hold: Option<Hold>,
     asked: usize,
     /// Reading at the last question, as long as readings stay near it.

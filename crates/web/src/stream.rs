@@ -3,8 +3,9 @@
 use std::collections::VecDeque;
 
 use ohmstrain::number::significant;
-use ohmstrain::{Interface, MADE_BY, QuietWatch, Sensor, ValidityWatch};
-use ohmstrain_bench_data::{Line, LineParser, Metadata, Reading, ReadingKind, ReferenceQuantity, Row, RowWriter};
+use ohmstrain::trace::{WatchedFilter, median};
+use ohmstrain::{MADE_BY, Sensor};
+use ohmstrain_bench_data::{Line, LineParser, Metadata, Row, RowWriter};
 use serde::Serialize;
 use wasm_bindgen::prelude::*;
 
@@ -14,10 +15,6 @@ use crate::stream_lines::Lines;
 /// Duration, s, over which the reading of the rested sensor is determined, and the smallest number of readings for that.
 const REST_S: f64 = 1.0;
 const LEAST_AT_REST: usize = 5;
-/// Standard deviation of a known rest, as a share of the limits' span: that of a known strain on the command line.
-const KNOWN_TO: f64 = 0.005;
-/// Number of readings after which their unit is checked.
-const FIRST_READINGS: usize = 20;
 /// Numbers per row that are returned.
 const WIDTH: usize = 4;
 
@@ -26,11 +23,7 @@ const WIDTH: usize = 4;
 pub struct Stream {
     sensor: Sensor,
     lines: Lines,
-    filter: ohmstrain::Filter,
-    watch: ValidityWatch,
-    quiet: QuietWatch,
-    rest: Option<f64>,
-    early: Vec<f64>,
+    filter: WatchedFilter,
     /// Times, s, and readings of the last seconds.
     recent: VecDeque<(f64, f64)>,
     counts: Counts,
@@ -67,16 +60,11 @@ impl Stream {
             overrides.front_end = Some(text.parse().map_err(|error| format!("--front-end: {error}"))?);
         }
         let lines = Lines::new(LineParser::new("the port", overrides), header)?;
-        let filter = sensor.filter().build().map_err(|error| error.to_string())?;
-        let (watch, quiet) = (ValidityWatch::new(sensor, None), QuietWatch::new(sensor, None, &[]));
+        let filter = WatchedFilter::new(sensor.filter(), 0).map_err(|error| error.to_string())?;
         let mut stream = Self {
             sensor: sensor.clone(),
             lines,
             filter,
-            watch,
-            quiet,
-            rest: None,
-            early: vec![],
             recent: VecDeque::new(),
             counts: Counts::default(),
             message: String::new(),
@@ -108,7 +96,7 @@ impl Stream {
 
     /// Begins another stream after a header.
     fn headed(&mut self) -> Result<(), String> {
-        let (found, expected) = (self.reading_column(), self.sensor.columns()[1].name());
+        let (found, expected) = (self.columns()[1], self.sensor.columns()[1].name());
         let is_ratio = found == "resistance_ratio";
         if is_ratio != (expected == "resistance_ratio") {
             return Err(format!(
@@ -122,28 +110,15 @@ impl Stream {
     /// Restarts everything that depends on time, after the clock has restarted.
     fn restart(&mut self) -> Result<(), String> {
         self.counts.restarts += 1;
-        self.begin(false)?;
+        self.filter.begin(self.sensor.filter()).map_err(|error| error.to_string())?;
+        self.recent.clear();
         self.message = "the clock has started again, and so has the filter".into();
         Ok(())
     }
 
-    /// Starts a new filter.
-    fn begin(&mut self, at_zero: bool) -> Result<(), String> {
-        let builder = self.sensor.filter();
-        let builder = self.rest.map_or(builder, |measured| builder.rest_resistance(measured));
-        // A sensor whose range excludes zero cannot start there.
-        let zero = at_zero.then(|| builder.initial_strain(0.0).build().ok()).flatten();
-        self.filter = zero.map_or_else(|| builder.build(), Ok).map_err(|error| error.to_string())?;
-        self.watch = ValidityWatch::new(&self.sensor, self.rest);
-        self.quiet = QuietWatch::new(&self.sensor, self.rest, &[]);
-        self.recent.clear();
-        Ok(())
-    }
-
     fn take_row(&mut self, row: &Row, out: &mut Vec<f64>) -> Result<(), String> {
-        let Reading { value, sd_ohm, saturated, .. } = row.reading;
-        let reading = ohmstrain::Reading { value, sd: sd_ohm.unwrap_or(0.0), saturated };
-        let estimate = match self.filter.step(row.time_s, reading) {
+        let value = row.reading.value;
+        let estimate = match self.filter.step(row) {
             Ok(estimate) => estimate,
             Err(error) => {
                 self.counts.bad_lines += 1;
@@ -159,63 +134,24 @@ impl Stream {
         {
             self.recent.pop_front();
         }
-        if let Some(warning) = self.watch.see(row.time_s, value, estimate.strain_rate, f64::NAN).last() {
-            self.message = warning.to_string();
+        if let Some(remark) = self.filter.remark(&estimate, "say so").map_err(|error| error.to_string())? {
+            self.message = remark;
         }
-        if let Some(quiet) = self.quiet.see(&estimate) {
-            let quiet_s = significant(quiet.now_s - quiet.from_s, 2);
-            self.message = format!("{quiet_s} s of quiet that may be a rest: say so, if it is one");
-        }
-        self.doubt_early(value);
         self.record_row(row).map_err(|error| error.to_string())?;
         out.extend([row.time_s, value, estimate.strain, estimate.strain_sd]);
         Ok(())
     }
 
-    /// Checks the unit of the readings, once there are enough.
-    fn doubt_early(&mut self, value: f64) {
-        if !value.is_finite() || self.early.len() >= FIRST_READINGS {
-            return;
-        }
-        self.early.push(value);
-        if self.early.len() == FIRST_READINGS
-            && let Err(doubt) = self.sensor.check_unit(self.early.iter().copied(), self.rest)
-        {
-            self.message = doubt.text(Interface::CommandLine);
-        }
-    }
-
-    fn reading_column(&self) -> &'static str {
-        match (self.lines.parser.has_codes(), self.lines.parser.reading_kind()) {
-            (true, _) => "adc",
-            (_, Some(ReadingKind::Ratio)) => "resistance_ratio",
-            _ => "resistance_ohm",
-        }
-    }
-
-    fn reference_column(&self) -> Option<&'static str> {
-        self.lines.parser.reference_quantity().map(|quantity| match quantity {
-            ReferenceQuantity::Strain => "strain",
-            ReferenceQuantity::AngleDeg => "angle_deg",
-        })
-    }
-
     /// Returns the columns of the record; empty before a header.
     fn columns(&self) -> Vec<&'static str> {
-        if self.lines.parser.reading_kind().is_none() {
-            return vec![];
-        }
-        ["time_s", self.reading_column()].into_iter().chain(self.reference_column()).collect()
+        let parser = &self.lines.parser;
+        parser.reading_kind().map(|_| "time_s").into_iter().chain(parser.recorded_columns()).collect()
     }
 
     fn record_row(&mut self, row: &Row) -> std::io::Result<()> {
-        let (has_codes, has_reference) = (self.lines.parser.has_codes(), self.reference_column().is_some());
         let mut rows = RowWriter::new(&mut self.record);
         rows.number(row.time_s);
-        rows.number(if has_codes { row.reading.code.map_or(f64::NAN, f64::from) } else { row.reading.value });
-        if has_reference {
-            rows.number(row.reference);
-        }
+        self.lines.parser.recorded(row).for_each(|number| rows.number(number));
         rows.end()?;
         rows.flush()
     }
@@ -244,28 +180,24 @@ impl Stream {
 
     /// Takes the sensor as rested and unstretched now: the strain is zero.
     pub fn rest(&mut self) -> Result<(), JsError> {
-        let sd = KNOWN_TO * self.sensor.params().limits.span();
-        self.filter.know(0.0, sd).map_err(refused)?;
+        self.filter.rest().map_err(refused)?;
         self.message = "the strain is zero now".into();
         Ok(())
     }
 
     /// Takes the sensor as rested now: its reading becomes R₀, and the strain starts again at zero.
-    pub fn zero(&mut self) -> Result<(), JsError> {
-        let mut readings: Vec<f64> =
+    pub fn zero(&mut self) {
+        let readings: Vec<f64> =
             self.recent.iter().map(|(_, reading)| *reading).filter(|reading| reading.is_finite()).collect();
-        readings.sort_by(f64::total_cmp);
         let count = readings.len();
-        let Some(middle) = readings.get(count / 2) else { return Ok(()) };
-        let rest = if count % 2 == 1 { *middle } else { 0.5 * (readings[count / 2 - 1] + middle) };
-        if let Err(refusal) = self.sensor.check_rest_resistance(rest) {
-            self.message = format!("R0 stays as it was: {refusal}");
-            return Ok(());
-        }
-        self.rest = Some(rest);
-        self.begin(true).map_err(refused)?;
-        self.message = format!("R0 is {} now, the median of {count} readings", significant(rest, 5));
-        Ok(())
+        let Some(rest) = median(readings) else { return };
+        self.message = match self.filter.zero(self.sensor.filter(), rest) {
+            Err(refused) => format!("R0 stays as it was: {refused}"),
+            Ok(_) => {
+                self.recent.clear();
+                format!("R0 is {} now, the median of {count} readings", significant(rest, 5))
+            }
+        };
     }
 
     /// Returns the rows of a trace CSV since the last call.

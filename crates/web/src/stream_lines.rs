@@ -1,44 +1,26 @@
 //! Lines of a board in the form of a trace: missing times are added, milliseconds become seconds.
 
-use ohmstrain_bench_data::{BadContent, Line, LineParser};
+use std::borrow::Cow;
 
-/// Interval between lines that arrive at once, s: a hundred times the resolution of the written times.
-const LEAST_STEP_S: f64 = 1e-4;
-
-/// Source of the lines' times.
-enum Clock {
-    /// Times in the lines themselves.
-    Own,
-    /// A cell of milliseconds in each line, by its index.
-    Milliseconds(usize),
-    /// Arrival of the lines: the first time, and the last time since then, s.
-    Arrival(Option<f64>, f64),
-}
+use ohmstrain_bench_data::{BadContent, Headed, Line, LineParser};
 
 /// Parser of lines.
 pub struct Lines {
     pub parser: LineParser,
-    clock: Clock,
+    headed: Headed,
+    /// Index of a cell of milliseconds in each line, if there is one.
+    milliseconds: Option<usize>,
 }
 
 impl Lines {
     /// Creates a parser that waits for a header, unless one is given.
     pub fn new(mut parser: LineParser, header: Option<&str>) -> Result<Self, String> {
-        let Some(header) = header else { return Ok(Self { parser, clock: Clock::Own }) };
-        let names: Vec<&str> = header.split(',').map(str::trim).collect();
-        let clock = match names.iter().position(|name| *name == "time_ms") {
-            Some(place) => Clock::Milliseconds(place),
-            None if names.iter().any(|name| matches!(*name, "time_s" | "time_us")) => Clock::Own,
-            None => Clock::Arrival(None, -LEAST_STEP_S),
-        };
-        let header = match clock {
-            Clock::Arrival(..) => format!("time_s,{header}"),
-            _ => header.replace("time_ms", "time_s"),
-        };
-        match parser.take(header.as_bytes()) {
-            Ok(Line::Header) => Ok(Self { parser, clock }),
-            Ok(_) => Err("--header: expected names of columns".into()),
-            Err(fault) => Err(format!("--header: expected {}", fault.expected)),
+        let milliseconds = header.and_then(|names| names.split(',').position(|name| name.trim() == "time_ms"));
+        let headed = Headed::new(header.map(|names| names.replace("time_ms", "time_s")).as_deref());
+        match headed.header().map(|header| parser.take(header.as_bytes())) {
+            None | Some(Ok(Line::Header)) => Ok(Self { parser, headed, milliseconds }),
+            Some(Ok(_)) => Err("--header: expected names of columns".into()),
+            Some(Err(fault)) => Err(format!("--header: expected {}", fault.expected)),
         }
     }
 
@@ -47,18 +29,8 @@ impl Lines {
         if line.trim().is_empty() {
             return Ok(Line::Nothing);
         }
-        match &mut self.clock {
-            Clock::Own => self.parser.take(line.as_bytes()),
-            Clock::Milliseconds(place) => {
-                let line = with_seconds(line, *place);
-                self.parser.take(line.as_bytes())
-            }
-            Clock::Arrival(first_s, last_s) => {
-                let elapsed_s = arrived_s - *first_s.get_or_insert(arrived_s);
-                *last_s = elapsed_s.max(*last_s + LEAST_STEP_S);
-                self.parser.take(format!("{last_s:.6},{line}").as_bytes())
-            }
-        }
+        let line = self.milliseconds.map_or(Cow::from(line), |place| with_seconds(line, place).into());
+        self.parser.take(&self.headed.line(line.as_bytes(), arrived_s))
     }
 }
 

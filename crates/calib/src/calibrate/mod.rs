@@ -21,9 +21,7 @@ use crate::CalibrationError;
 use crate::baselines::fit_static_cubic;
 use crate::calibrate::correction_fit::fit_correction;
 use crate::calibrate::findings::{Check, Checked, LeftOutRow, seen};
-use crate::calibrate::noise_fit::{
-    NoiseProblem, REFINEMENT, SURVEY, Surveyed, best_of_each_size, survey, survey_evaluations,
-};
+use crate::calibrate::noise_fit::{FURTHER, NoiseProblem, REFINEMENT, SURVEY, Surveyed, survey, survey_evaluations};
 use crate::calibrate::recipe::RECIPE;
 use crate::law::fit::{CrossFit, LawOptions, fit_laws};
 use crate::law::identifiability::identifiability;
@@ -187,8 +185,9 @@ fn calibrate_arranged(
     let wanted = asked.all();
     let mut estimators = BTreeMap::new();
     for kind in EstimatorKind::distinct(wanted.iter().copied().chain([EstimatorKind::Ekf])) {
-        let known = surveyed.iter().find(|one| one.kind == kind && std::ptr::eq(one.law, fit));
-        let params = refined(recordings, (fit, stats), (kind, prior), known, &mut || steps.evaluated())?;
+        let problem =
+            NoiseProblem::new(recordings, fit, stats, kind).with_prior(prior.and_then(|prior| prior.estimator(kind)));
+        let params = refined(&problem, kind, &asked, (fit, &surveyed), &mut || steps.evaluated())?;
         estimators.insert(kind, params);
     }
     let score =
@@ -253,10 +252,19 @@ impl<'a> Asked<'a> {
         EstimatorKind::distinct(self.candidates.iter().chain(&self.named).copied())
     }
 
-    /// Returns the approximate number of evaluations, for a progress bar: surveys, and a refinement of each filter and of the EKF.
+    /// Returns the first candidate if this is one of those after it.
+    fn first_before(&self, kind: EstimatorKind) -> Option<EstimatorKind> {
+        let (first, further) = self.candidates.split_first()?;
+        further.contains(&kind).then_some(*first)
+    }
+
+    /// Returns the approximate number of evaluations, for a progress bar: the searches for each filter and for the EKF.
     fn expected_evaluations(&self, laws: &[CrossFit]) -> u64 {
-        let surveys = self.all().len() as u64 * survey_evaluations(laws.len());
-        surveys + SURVEY.evaluations() + (self.all().len() as u64 + 1) * REFINEMENT.evaluations()
+        let of_filter = |kind: EstimatorKind| match self.first_before(kind) {
+            Some(_) => FURTHER.evaluations(),
+            None => survey_evaluations(laws.len()) + REFINEMENT.evaluations(),
+        };
+        self.all().into_iter().map(of_filter).sum::<u64>() + SURVEY.evaluations() + REFINEMENT.evaluations()
     }
 }
 
@@ -322,8 +330,7 @@ impl<P: FnMut(Stage)> Steps<P> {
     }
 }
 
-/// Surveys estimators under the laws. The first of the candidates for a correction is tried under all of them, the others under the laws
-/// that suited it best.
+/// Surveys estimators under the laws, but for the further candidates for a correction.
 fn survey_all<'a>(
     recordings: &[Samples],
     laws: &'a [CrossFit],
@@ -333,28 +340,27 @@ fn survey_all<'a>(
     evaluated: &mut dyn FnMut(),
 ) -> Result<Vec<Surveyed<'a>>, CalibrationError> {
     let mut surveyed: Vec<Surveyed<'a>> = Vec::new();
-    for kind in asked.all() {
-        let is_other_candidate = asked.candidates.iter().skip(1).any(|candidate| *candidate == kind);
-        let laws = if is_other_candidate { best_of_each_size(&surveyed) } else { laws.iter().collect() };
+    for kind in asked.all().into_iter().filter(|kind| asked.first_before(*kind).is_none()) {
         let of_make = prior.and_then(|prior| prior.estimator(kind));
-        surveyed.extend(survey(recordings, &laws, stats, (kind, of_make), &mut *evaluated)?);
+        surveyed.extend(survey(recordings, laws, stats, (kind, of_make), &mut *evaluated)?);
     }
     Ok(surveyed)
 }
 
-/// Fits noise and motion of an estimator under a law; a `known` survey is not repeated.
+/// Fits noise and motion of an estimator under a law: from its survey; from that of the first candidate, if it is a further one; or from
+/// its untuned values.
 fn refined(
-    recordings: &[Samples],
-    (fit, stats): (&CrossFit, MotionStats),
-    (kind, prior): (EstimatorKind, Option<&Prior>),
-    known: Option<&Surveyed>,
+    problem: &NoiseProblem,
+    kind: EstimatorKind,
+    asked: &Asked,
+    (fit, surveyed): (&CrossFit, &[Surveyed]),
     evaluated: &mut dyn FnMut(),
 ) -> Result<EstimatorParams, CalibrationError> {
-    let of_make = prior.and_then(|prior| prior.estimator(kind));
-    let problem = NoiseProblem::new(recordings, fit, stats, kind).with_prior(of_make);
-    let tuned = match known {
-        Some(known) => known.tuned.clone(),
-        None => problem.search(None, SURVEY, &mut *evaluated)?,
+    let found = |kind: EstimatorKind| surveyed.iter().find(|one| one.kind == kind && std::ptr::eq(one.law, fit));
+    let (from, search) = match (found(kind), asked.first_before(kind).and_then(found)) {
+        (Some(own), _) => (own.tuned.point.clone(), REFINEMENT),
+        (None, Some(first)) => (problem.with_common_of(&first.tuned), FURTHER),
+        (None, None) => (problem.search(None, SURVEY, &mut *evaluated)?.point, REFINEMENT),
     };
-    problem.refine(&tuned, &mut *evaluated)
+    problem.refine(&from, search, &mut *evaluated)
 }

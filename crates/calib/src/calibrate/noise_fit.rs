@@ -1,5 +1,3 @@
-use std::collections::BTreeMap;
-
 use ohmstrain_ekf::live::news;
 
 use crate::CalibrationError;
@@ -7,7 +5,7 @@ use crate::calibrate::left_out::{Fold, LeftOut};
 use crate::calibrate::settling::LongHolds;
 use crate::law::fit::CrossFit;
 use crate::motion_stats::{MotionStats, root_mean_square};
-use crate::optimise;
+use crate::optimise::{Ends, nelder_mead};
 use crate::prior::EstimatorPrior;
 use crate::samples::{Samples, usual_step_s};
 use crate::sd_scale::sd_scale;
@@ -28,15 +26,22 @@ pub(crate) struct Search {
     rows: usize,
     /// Factor on the longest step of sign-split. Thinned rows are far apart, and would otherwise be divided into as many steps as all rows.
     step_factor: f64,
+    /// Gain of the score, a mean log density of strain, below which the search ends.
+    least_gain: f64,
 }
 
 /// Search that measures the quality of an estimator with a law.
-pub(crate) const SURVEY: Search = Search { side: 0.7, steps: 100, rows: 500, step_factor: 4.0 };
+pub(crate) const SURVEY: Search = Search { side: 0.7, steps: 100, rows: 500, step_factor: 4.0, least_gain: 0.0 };
 
 /// Search that measures the quality with another law, starting from the result with the law before.
-const RESURVEY: Search = Search { side: 0.4, steps: 25, rows: 500, step_factor: 4.0 };
+const RESURVEY: Search = Search { side: 0.4, steps: 25, rows: 500, step_factor: 4.0, least_gain: 0.0 };
 /// Search that refines the best survey.
-pub(crate) const REFINEMENT: Search = Search { side: 0.3, steps: 45, rows: 1500, step_factor: 1.0 };
+pub(crate) const REFINEMENT: Search = Search { side: 0.3, steps: 45, rows: 1500, step_factor: 1.0, least_gain: 0.0 };
+
+/// Search for a further filter, from what is known of the first. Its steps are not lengthened, so that fewer rows would save little time. It
+/// ends where it hardly gains, half a percent in the standard deviation: merging and pruning make the score rough, and a simplex wanders
+/// long over what is left.
+pub(crate) const FURTHER: Search = Search { side: 0.7, steps: 100, least_gain: 0.005, ..REFINEMENT };
 
 impl Search {
     /// Returns the expected number of evaluations: a step of the simplex evaluates one or two points.
@@ -72,14 +77,14 @@ pub(crate) struct Surveyed<'a> {
 /// Searches under one law after another, each from the end point of the one before.
 pub(crate) fn survey<'a>(
     samples: &[Samples],
-    laws: &[&'a CrossFit],
+    laws: &'a [CrossFit],
     stats: MotionStats,
     (kind, of_make): (EstimatorKind, Option<&EstimatorPrior>),
     evaluated: &mut dyn FnMut(),
 ) -> Result<Vec<Surveyed<'a>>, CalibrationError> {
     let mut surveyed: Vec<Surveyed<'a>> = Vec::new();
-    for &law in laws {
-        let before = surveyed.last().map(|one| &one.tuned);
+    for law in laws {
+        let before = surveyed.last().map(|one| one.tuned.point.as_slice());
         let search = if before.is_none() { SURVEY } else { RESURVEY };
         let problem = NoiseProblem::new(samples, law, stats, kind).with_prior(of_make);
         let tuned = problem.search(before, search, &mut *evaluated)?;
@@ -88,23 +93,11 @@ pub(crate) fn survey<'a>(
     Ok(surveyed)
 }
 
-/// Returns the best law of each number of branches.
-pub(crate) fn best_of_each_size<'a>(surveyed: &[Surveyed<'a>]) -> Vec<&'a CrossFit> {
-    let mut best: BTreeMap<usize, &Surveyed<'a>> = BTreeMap::new();
-    for one in surveyed {
-        let best = best.entry(one.law.branches()).or_insert(one);
-        if one.tuned.cost < best.tuned.cost {
-            *best = one;
-        }
-    }
-    best.into_values().map(|one| one.law).collect()
-}
-
 /// State of a search.
 #[derive(Clone, Debug)]
 pub(crate) struct Tuned {
     /// Logarithms of the parameters.
-    point: Vec<f64>,
+    pub point: Vec<f64>,
     /// Minimised cost.
     pub cost: f64,
 }
@@ -148,7 +141,7 @@ impl<'a> NoiseProblem<'a> {
     /// Searches from the values that residuals and motion suggest, or from the end point of another search.
     pub(crate) fn search(
         &self,
-        from: Option<&Tuned>,
+        from: Option<&[f64]>,
         search: Search,
         mut evaluated: impl FnMut(),
     ) -> Result<Tuned, CalibrationError> {
@@ -160,16 +153,27 @@ impl<'a> NoiseProblem<'a> {
             let score = left_out.score(&|fold| self.recipe(self.kind, fold, params).in_longer_steps(step_factor));
             score + self.pull(point)
         };
-        let from = from.map_or(&self.untuned, |tuned| &tuned.point);
-        let point = optimise::nelder_mead(&mut cost, from, search.side, search.steps);
+        let from = from.unwrap_or(&self.untuned);
+        let ends = Ends { iterations: search.steps, least_gain: search.least_gain };
+        let point = nelder_mead(&mut cost, from, search.side, ends);
         Ok(Tuned { cost: cost(&point), point })
     }
 
-    /// Continues a survey's search. If that thinned the rows, it also chooses the correlation time of the readings' errors with the best
-    /// score on every row. The starting values compete as well, because the search has not seen most of these rows.
-    pub(crate) fn refine(&self, from: &Tuned, evaluated: impl FnMut()) -> Result<EstimatorParams, CalibrationError> {
-        let refined = self.search(Some(from), REFINEMENT, evaluated)?.point;
-        let stride = self.stride(REFINEMENT.rows);
+    /// Returns the start of a search for this estimator that takes what all estimators have in common from another one's search.
+    pub(crate) fn with_common_of(&self, other: &Tuned) -> Vec<f64> {
+        other.point.iter().take(OF_ALL).chain(self.untuned.iter().skip(OF_ALL)).copied().collect()
+    }
+
+    /// Searches from `from`. If that thinned the rows, it also chooses the correlation time of the readings' errors with the best score on
+    /// every row. The untuned values compete as well, because the search has not seen most of these rows.
+    pub(crate) fn refine(
+        &self,
+        from: &[f64],
+        search: Search,
+        evaluated: impl FnMut(),
+    ) -> Result<EstimatorParams, CalibrationError> {
+        let refined = self.search(Some(from), search, evaluated)?.point;
+        let stride = self.stride(search.rows);
         let every_row = self.left_out(1);
         let step_s = stride as f64 * usual_step_s(self.samples.iter().map(|samples| samples.time_s));
         let times = if stride > 1 { &ERROR_TIMES[..] } else { &ERROR_TIMES[..1] };

@@ -5,7 +5,7 @@
 //! state differ between recordings. Settings and factors are judged on held-out recordings: neighbours within one recording share errors
 //! that do not occur on another day.
 
-use crate::dense::product;
+use crate::dense::{cholesky, gram_of, inverse, product};
 use crate::order::mean_sd;
 use std::ops::Range;
 
@@ -123,7 +123,7 @@ impl Sums {
         for i in 0..matrix.nrows() {
             matrix[(i, i)] += LEAST;
         }
-        matrix.cholesky()
+        cholesky(matrix)
     }
 
     /// Returns the weights of the few rows, in the unit of the targets, and the prior variance where the kernel is 1, in that unit squared.
@@ -143,12 +143,12 @@ impl Sums {
     /// Predicts every row without its recording, for a prior variance of 1.
     pub(super) fn left_out(&self, noise: f64) -> Option<Vec<LeftOutRow>> {
         let m = self.few.nrows();
-        let among = self.few.clone().cholesky()?.inverse();
+        let among = inverse(&cholesky(self.few.clone())?);
         let mut predicted = Vec::with_capacity(self.targets.len());
         for (own, rows) in self.own.iter().zip(&self.recordings) {
             let factor = self.factor(noise, Some(own))?;
             let weights = factor.solve(&(&self.all.right - &own.right));
-            let known = &among - factor.inverse().view((0, 0), (m, m)) * Self::white(noise);
+            let known = &among - inverse(&factor).view((0, 0), (m, m)) * Self::white(noise);
             let kernels = self.kernels.rows(rows.start, rows.len());
             let (means, weighted) = (kernels * weights.rows(0, m), product(kernels, &known));
             predicted.extend(rows.clone().enumerate().map(|(k, row)| {
@@ -179,12 +179,12 @@ impl Sums {
     /// through these of the few, whose kernels are k.
     pub(super) fn explained(&self, noise: f64, inducing: &[usize]) -> Option<Vec<f64>> {
         let m = inducing.len();
-        let among = self.few.select_rows(inducing).select_columns(inducing).cholesky()?.inverse();
+        let among = inverse(&cholesky(self.few.select_rows(inducing).select_columns(inducing))?);
         let kept: Vec<usize> = inducing.iter().copied().chain(self.few.nrows()..self.regular.nrows()).collect();
         let matrix = &self.regular * Self::white(noise) + &self.all.matrix;
         let matrix =
             matrix.select_rows(&kept).select_columns(&kept) + DMatrix::identity(kept.len(), kept.len()) * LEAST;
-        let left = matrix.cholesky()?.inverse();
+        let left = inverse(&cholesky(matrix)?);
         let known = among - left.view((0, 0), (m, m)) * Self::white(noise);
         let parts = (0.5 * (&known + known.transpose())).symmetric_eigen();
         let roots = parts.eigenvalues.map(|value| value.max(0.0).sqrt());
@@ -204,7 +204,7 @@ impl Normal {
         let m = kernels.ncols();
         let (own, targets) = (kernels.rows(rows.start, rows.len()), targets.rows(rows.start, rows.len()));
         let mut matrix = DMatrix::zeros(all, all);
-        matrix.view_mut((0, 0), (m, m)).copy_from(&(own.tr_mul(&own) * share));
+        matrix.view_mut((0, 0), (m, m)).copy_from(&(gram_of(own) * share));
         let sums = own.row_sum() * share;
         matrix.view_mut((offset, 0), (1, m)).copy_from(&sums);
         matrix.view_mut((0, offset), (m, 1)).copy_from(&sums.transpose());

@@ -3,7 +3,7 @@
 use fearless_simd::{Level, dispatch};
 use nalgebra::{Cholesky, DMatrix, Dyn, Matrix, Storage};
 
-use super::gram::dot;
+use super::gram::{dot, gram_of};
 use super::tile::{COLUMNS, ROWS, Tile, tile};
 
 /// Factors `A = L Lᵀ` (n × n, from its lower triangle); `None` if it is not positive definite. Digit for digit the factor of nalgebra: each
@@ -86,6 +86,11 @@ pub(crate) fn lower_inverse<S: Storage<f64, Dyn, Dyn>>(triangle: &Matrix<f64, Dy
     inverse
 }
 
+/// Returns the inverse `L⁻ᵀ L⁻¹` of the factored matrix.
+pub(crate) fn inverse(factor: &Cholesky<f64, Dyn>) -> DMatrix<f64> {
+    gram_of(&lower_inverse(factor.l_dirty()))
+}
+
 /// Returns the diagonal of the inverse of the factored matrix.
 pub(crate) fn inverse_diagonal(factor: &Cholesky<f64, Dyn>) -> Vec<f64> {
     let triangle = factor.l_dirty();
@@ -125,7 +130,7 @@ fn part_of(triangle: &DMatrix<f64>, column: usize) -> &[f64] {
 
 #[cfg(test)]
 mod tests {
-    use super::{cholesky, cholesky_at, inverse_diagonal, lower_inverse};
+    use super::{cholesky, cholesky_at, inverse, inverse_diagonal, lower_inverse};
     use fearless_simd::Level;
     use nalgebra::DMatrix;
 
@@ -167,6 +172,10 @@ mod tests {
             let identity = DMatrix::identity(matrix.nrows(), matrix.nrows());
             let of_triangle = expected.l_dirty().solve_lower_triangular(&identity).unwrap();
             assert_eq!(lower_inverse(factor.l_dirty()), of_triangle);
+            // Rounding of n products, times the condition number, which is below the trace of both.
+            let (whole, n) = (expected.inverse(), matrix.nrows() as f64);
+            let rounding = n * f64::EPSILON * matrix.trace() * whole.trace() * whole.amax();
+            assert!((inverse(&factor) - whole).amax() <= rounding);
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Products of columns with each other.
 
 use fearless_simd::{Level, Simd, SimdBase, dispatch, f64x4};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DMatrixView};
 
 use super::tile::{ROWS, Vectors, numbers, vectors};
 
@@ -18,6 +18,13 @@ type Sums = [[[f64; PARTS]; COLUMNS]; COLUMNS];
 /// Panics if columns differ in length.
 pub(crate) fn gram(columns: &[&[f64]]) -> DMatrix<f64> {
     gram_at(Level::new(), columns)
+}
+
+/// Returns `AᵀA` (n × n) of a matrix, or of some of its rows.
+pub(crate) fn gram_of<'a>(matrix: impl Into<DMatrixView<'a, f64>>) -> DMatrix<f64> {
+    let matrix = matrix.into();
+    let columns: Vec<_> = matrix.column_iter().collect();
+    gram(&columns.iter().map(|column| column.as_slice()).collect::<Vec<_>>())
 }
 
 /// Computes the product with the instructions of this level.

@@ -8,6 +8,6 @@ mod gram;
 mod product;
 mod tile;
 
-pub(crate) use cholesky::{cholesky, inverse_diagonal, lower_inverse};
-pub(crate) use gram::gram;
+pub(crate) use cholesky::{cholesky, inverse, inverse_diagonal, lower_inverse};
+pub(crate) use gram::{gram, gram_of};
 pub(crate) use product::product;

@@ -4,7 +4,7 @@ use crate::law::design::BRANCH_COLUMNS;
 use crate::law::regression::{LawRegression, VALIDATION_BLOCKS};
 use crate::law::robust_loss::robust;
 use crate::law::structure::{GaugeFamily, LawFit, LawStructure};
-use crate::optimise;
+use crate::optimise::{Ends, nelder_mead};
 use crate::samples::Samples;
 use ohmstrain_sensor::{EstimatorKind, MOST_BRANCHES};
 
@@ -63,7 +63,7 @@ const GRID: usize = 12;
 /// direction; each estimator chooses by its own score.
 const LAW_RIDGES: [f64; 5] = [0.1, 0.03, 0.01, 0.003, 0.001];
 /// Steps of the polish of the time constants, and the side of its first simplex in ln τ.
-const POLISH_STEPS: u64 = 40;
+const POLISH_ENDS: Ends = Ends { iterations: 40, least_gain: 0.0 };
 const POLISH_SIDE: f64 = 0.3;
 /// Smallest distance between time constants on the grid, in ln τ, if the bounds allow it: closer ones trade off their gains. The polish may
 /// halve it.
@@ -215,7 +215,7 @@ fn polish(
         regression.solve(&design, ridge, None).map(|solution| solution.cross_validated.ln())
     };
     let cost = |nonlinear: &[f64]| score(nonlinear).unwrap_or(f64::INFINITY);
-    let point = if start.is_empty() { start } else { optimise::nelder_mead(cost, &start, POLISH_SIDE, POLISH_STEPS) };
+    let point = if start.is_empty() { start } else { nelder_mead(cost, &start, POLISH_SIDE, POLISH_ENDS) };
     Ok(structure(&point))
 }
 

@@ -5,7 +5,7 @@ use super::{
     ReadingSeries, ReadingsLikelihood,
 };
 use crate::CalibrationError;
-use crate::optimise::nelder_mead;
+use crate::optimise::{Ends, nelder_mead};
 use ohmstrain_sensor::LawParams;
 
 /// The likelihood of readings `R/R₀ - 1` under the extended Kalman filter of a known law, as a function of the parameters in `free`, each
@@ -87,7 +87,7 @@ impl LikelihoodProblem<'_> {
 const MOST_ROUNDS: usize = 3;
 const MOST_STEPS: usize = 40;
 /// Side of the simplex, in the logarithms, and its number of steps; a hundred cost as much as a few Newton steps.
-const SIMPLEX: (f64, u64) = (0.3, 200);
+const SIMPLEX: (f64, Ends) = (0.3, Ends { iterations: 200, least_gain: 0.0 });
 
 /// Returns the parameters, starting from the best point that a simplex finds around `from`.
 fn across_jumps<F: ModelFamily<N, L>, const N: usize, const L: usize>(

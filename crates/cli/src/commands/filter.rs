@@ -3,7 +3,7 @@ use std::path::Path;
 
 use ohmstrain::Interface::CommandLine;
 use ohmstrain::number::significant;
-use ohmstrain::trace::{self, check_unit};
+use ohmstrain::trace::{self, FIRST_LIVE_READINGS, check_unit};
 use ohmstrain::{
     Error, Estimate, Filter, FilterBuilder, Known, LaggedFilter, QuietWatch, Reading, Sensor, Stored, ValidityWatch,
 };
@@ -19,7 +19,7 @@ use crate::readings::{late, no_row};
 use crate::run::{builder, builder_anew, rest_resistance};
 use crate::sensor_file;
 use crate::stream::{self, RowSource};
-use crate::suits::{self, FIRST_LIVE_READINGS, FIRST_READINGS};
+use crate::suits::{self, FIRST_READINGS};
 use crate::whole_file::is_stdin;
 
 /// Turns readings into strain as they arrive, and returns the number of rows. Memory does not grow with the recording.

@@ -1,6 +1,5 @@
 //! Lines of a port as they arrive: a serial port, a pipe, the network, or a recording that is played back.
 
-mod arrivals;
 mod network;
 mod source;
 
@@ -11,7 +10,6 @@ use std::time::{Duration, Instant};
 use crate::args::PortArgs;
 use crate::error::CliError;
 
-pub use arrivals::Headed;
 pub use source::{Event, Source};
 
 /// Longest time for which rows are taken in one go.
@@ -30,11 +28,11 @@ pub trait Taker {
     /// A parsed row.
     type Row;
 
-    /// Parses a line; `None` if it is not a row.
+    /// Parses a line that has arrived at `arrived_s` on the feed's clock; `None` if it is not a row.
     ///
     /// # Errors
     /// If the stream is unusable.
-    fn parse(&mut self, line: &[u8], arrived: Instant) -> Result<Option<Due<Self::Row>>, CliError>;
+    fn parse(&mut self, line: &[u8], arrived_s: f64) -> Result<Option<Due<Self::Row>>, CliError>;
 
     /// Takes a row that is due.
     ///
@@ -45,6 +43,7 @@ pub trait Taker {
 
 /// Rows of a port; those of a recording at the pace at which it was recorded.
 pub struct Feed<T> {
+    opened: Instant,
     source: Source,
     pace: Option<Pace>,
     /// A row that is not due yet.
@@ -61,13 +60,14 @@ impl<T> Feed<T> {
     /// # Errors
     /// If a recording cannot be read, or nothing can be received at an address.
     pub fn open(args: &PortArgs) -> Result<Self, CliError> {
+        let opened = Instant::now();
         let source = match (&args.udp, &args.tcp) {
             (Some(address), _) => Source::listening(|send| network::listen_udp(address, send))?,
             (None, Some(address)) => Source::listening(|send| network::read_tcp(address, send))?,
             (None, None) => Source::open(args.port.as_deref().unwrap_or(Path::new("-")), args.baud)?,
         };
         let pace = source.is_recording.then_some(Pace { speed: args.speed, started: None });
-        Ok(Self { source, pace, held: None, status: "waiting".into(), has_ended: false })
+        Ok(Self { opened, source, pace, held: None, status: "waiting".into(), has_ended: false })
     }
 
     /// Passes on the rows that have arrived and are due, for a short while.
@@ -114,7 +114,9 @@ impl<T> Feed<T> {
 
     fn handle(&mut self, event: Event, taker: &mut impl Taker<Row = T>) -> Result<(), CliError> {
         match event {
-            Event::Line(line, arrived) => self.held = taker.parse(&line, arrived)?,
+            Event::Line(line, arrived) => {
+                self.held = taker.parse(&line, arrived.duration_since(self.opened).as_secs_f64())?;
+            }
             Event::Connected => self.status = "connected".into(),
             Event::Away(why) => self.status = format!("waiting for the port: {why}"),
             Event::Ended => {

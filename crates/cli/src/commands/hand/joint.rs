@@ -1,6 +1,6 @@
 use std::path::Path;
 
-use ohmstrain::trace::{self, HandChannel, HandJoint, reading_column};
+use ohmstrain::trace::{self, FIRST_LIVE_READINGS, HandChannel, HandJoint, reading_column};
 use ohmstrain::{
     Error, Estimate, Filter, FilterBuilder, FusedEstimate, FusedFilter, FusedSensor, FusionParams, Quantity, Reading,
     ReadingUnit, Sensor, UnitGuess,
@@ -10,7 +10,6 @@ use ohmstrain_bench_data::{LineParser, Metadata};
 use crate::channels::masked;
 use crate::error::CliError;
 use crate::sensor_file;
-use crate::suits::FIRST_LIVE_READINGS;
 use crate::whole_file;
 
 /// A joint with its channels and their filter.

@@ -1,22 +1,19 @@
 //! State of the view of several joints: their filters, and the lines so far.
 
 use std::io;
-use std::time::Instant;
 
-use ohmstrain::trace::HandDescription;
-use ohmstrain_bench_data::{Metadata, Row};
+use ohmstrain::trace::{HandDescription, median};
+use ohmstrain_bench_data::{Headed, Metadata, Row};
 
 use super::Shown;
 use super::recorder::Recorder;
-use super::session::recorded;
 use super::track::{LEAST_AT_REST, REST_S, Timed, Track};
 use crate::args::LiveArgs;
 use crate::commands::hand::joint::{Channel, Joint, JointRow};
 use crate::commands::hand::lines::{HandParser, channels};
 use crate::commands::hand::{OF_ONE_SENSOR, joints, refuse_estimate, refuse_flags, step};
 use crate::error::CliError;
-use crate::port::{Due, Headed, Taker};
-use crate::run::median;
+use crate::port::{Due, Taker};
 
 /// Row of the plot.
 pub struct HandPoint {
@@ -79,7 +76,7 @@ impl<'a> HandSession<'a> {
     fn record(&mut self, rows: &[Row]) {
         let all: Vec<&Channel> = self.joints.iter().flat_map(|joint| &joint.channels).collect();
         let columns: Vec<&str> = all.iter().map(|channel| channel.entry.column.as_str()).collect();
-        let readings = own(&columns).map(|place| recorded(&rows[place], all[place].lines.has_codes()));
+        let readings = own(&columns).flat_map(|place| all[place].lines.recorded(&rows[place]));
         self.track.record(rows[0].time_s, readings);
     }
 
@@ -102,8 +99,8 @@ fn own<'c>(columns: &'c [&str]) -> impl Iterator<Item = usize> + 'c {
 impl Taker for HandSession<'_> {
     type Row = Vec<Row>;
 
-    fn parse(&mut self, line: &[u8], arrived: Instant) -> Result<Option<Due<Vec<Row>>>, CliError> {
-        let line = self.headed.line(line, arrived);
+    fn parse(&mut self, line: &[u8], arrived_s: f64) -> Result<Option<Due<Vec<Row>>>, CliError> {
+        let line = self.headed.line(line, arrived_s);
         let taken = self.parser.take(&line, &self.args.port.source(), &mut self.joints)?;
         if let Some(refused) = taken.refused {
             self.track.skip(format!("skipped {refused}"));

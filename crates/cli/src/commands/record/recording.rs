@@ -4,14 +4,14 @@ use std::collections::VecDeque;
 use std::time::Instant;
 
 use ohmstrain::MADE_BY;
-use ohmstrain_bench_data::{Metadata, counted};
+use ohmstrain_bench_data::{Headed, Metadata, counted};
 
 use super::columns::{Columns, StreamRow, known_cells};
 use super::pacer::Pacer;
 use super::writer::Writer;
 use crate::args::RecordArgs;
 use crate::error::CliError;
-use crate::port::{Due, Headed, Taker};
+use crate::port::{Due, Taker};
 
 /// Largest number of readings and planned values kept for the plots.
 const MOST_POINTS: usize = 1 << 14;
@@ -205,8 +205,8 @@ impl<'a> Recording<'a> {
 impl Taker for Recording<'_> {
     type Row = StreamRow;
 
-    fn parse(&mut self, line: &[u8], arrived: Instant) -> Result<Option<Due<StreamRow>>, CliError> {
-        let line = self.headed.line(line, arrived);
+    fn parse(&mut self, line: &[u8], arrived_s: f64) -> Result<Option<Due<StreamRow>>, CliError> {
+        let line = self.headed.line(line, arrived_s);
         let text = String::from_utf8_lossy(&line);
         let text = text.trim_start_matches('\u{feff}').trim();
         if text.is_empty() {
