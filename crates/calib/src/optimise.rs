@@ -143,6 +143,7 @@ mod tests {
         let best = nelder_mead(cost, &[0.1], -0.3, TO_THE_END);
         assert!((best[0] - 0.5).abs() < 1e-3, "{best:?}");
     }
+
     /// A steep slope gains more than a tenth whenever that is asked, a gentle one never: the simplex expands, but not ten
     /// thousandfold in nine evaluations.
     #[test]

@@ -1,4 +1,4 @@
-use ohmstrain::trace::median;
+use ohmstrain::number::median;
 use ohmstrain::{Error, FilterBuilder, Sensor};
 
 use crate::args::{EstimateArgs, RestResistance, Without};

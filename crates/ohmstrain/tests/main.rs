@@ -12,3 +12,5 @@ mod resumed;
 mod rows;
 mod surprises;
 mod threads;
+#[cfg(feature = "trace")]
+mod watched;

@@ -2,8 +2,8 @@
 
 use std::collections::VecDeque;
 
-use ohmstrain::number::significant;
-use ohmstrain::trace::{WatchedFilter, median};
+use ohmstrain::number::{median, significant};
+use ohmstrain::trace::WatchedFilter;
 use ohmstrain::{MADE_BY, Sensor};
 use ohmstrain_bench_data::{Line, LineParser, Metadata, Row, RowWriter};
 use serde::Serialize;

@@ -264,7 +264,10 @@ impl<'a> Asked<'a> {
             Some(_) => FURTHER.evaluations(),
             None => survey_evaluations(laws.len()) + REFINEMENT.evaluations(),
         };
-        self.all().into_iter().map(of_filter).sum::<u64>() + SURVEY.evaluations() + REFINEMENT.evaluations()
+        let fitted = EstimatorKind::distinct(self.all().into_iter().chain([EstimatorKind::Ekf]));
+        let of_ekf = SURVEY.evaluations() + REFINEMENT.evaluations();
+        let of_any = |kind| if self.all().contains(&kind) { of_filter(kind) } else { of_ekf };
+        fitted.into_iter().map(of_any).sum()
     }
 }
 
@@ -359,7 +362,7 @@ fn refined(
     let found = |kind: EstimatorKind| surveyed.iter().find(|one| one.kind == kind && std::ptr::eq(one.law, fit));
     let (from, search) = match (found(kind), asked.first_before(kind).and_then(found)) {
         (Some(own), _) => (own.tuned.point.clone(), REFINEMENT),
-        (None, Some(first)) => (problem.with_common_of(&first.tuned), FURTHER),
+        (None, Some(first)) => (problem.from_end_of(&first.tuned), FURTHER),
         (None, None) => (problem.search(None, SURVEY, &mut *evaluated)?.point, REFINEMENT),
     };
     problem.refine(&from, search, &mut *evaluated)

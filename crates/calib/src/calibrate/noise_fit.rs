@@ -26,7 +26,7 @@ pub(crate) struct Search {
     rows: usize,
     /// Factor on the longest step of sign-split. Thinned rows are far apart, and would otherwise be divided into as many steps as all rows.
     step_factor: f64,
-    /// Gain of the score, a mean log density of strain, below which the search ends.
+    /// Gain of the score, a mean log density of strain, in three evaluations per parameter, below which the search ends.
     least_gain: f64,
 }
 
@@ -44,9 +44,11 @@ pub(crate) const REFINEMENT: Search = Search { side: 0.3, steps: 45, rows: 1500,
 pub(crate) const FURTHER: Search = Search { side: 0.7, steps: 100, least_gain: 0.005, ..REFINEMENT };
 
 impl Search {
-    /// Returns the expected number of evaluations: a step of the simplex evaluates one or two points.
+    /// Returns the expected number of evaluations: a step of the simplex evaluates one or two points, and a search that may end early takes
+    /// half of its steps.
     pub(crate) const fn evaluations(self) -> u64 {
-        self.steps * 3 / 2
+        let steps = if self.least_gain > 0.0 { self.steps / 2 } else { self.steps };
+        steps * 3 / 2
     }
 }
 
@@ -94,7 +96,6 @@ pub(crate) fn survey<'a>(
 }
 
 /// State of a search.
-#[derive(Clone, Debug)]
 pub(crate) struct Tuned {
     /// Logarithms of the parameters.
     pub point: Vec<f64>,
@@ -159,8 +160,11 @@ impl<'a> NoiseProblem<'a> {
         Ok(Tuned { cost: cost(&point), point })
     }
 
-    /// Returns the start of a search for this estimator that takes what all estimators have in common from another one's search.
-    pub(crate) fn with_common_of(&self, other: &Tuned) -> Vec<f64> {
+    /// Returns the start of a search for this estimator, with noise and motion where another one's search ended; with a prior, its means.
+    pub(crate) fn from_end_of(&self, other: &Tuned) -> Vec<f64> {
+        if self.of_make.is_some() {
+            return self.untuned.clone();
+        }
         other.point.iter().take(OF_ALL).chain(self.untuned.iter().skip(OF_ALL)).copied().collect()
     }
 

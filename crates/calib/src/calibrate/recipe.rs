@@ -4,7 +4,7 @@ use ohmstrain_sensor::EstimatorKind;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Recipe {
     /// Filters to choose from, by their scores on every row of held-out blocks. The first is tried under every law, the others under the
-    /// law that suits it best, and only if the body rests for a tenth of the time or more.
+    /// law that is chosen, and only if the body rests for a tenth of the time or more.
     pub filters: &'static [EstimatorKind],
     /// Default estimator, calibrated unless another is requested: the filter, with or without corrected strain.
     pub estimator: EstimatorKind,

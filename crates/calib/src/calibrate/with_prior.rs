@@ -11,8 +11,8 @@ const ALONE: f64 = 1.0 / 3.0;
 /// Calibrates law, noise and motion on recordings with known strain. Deterministic: same samples, same result, in any order of the
 /// recordings. Outliers, and rows far from the law, are left out ([`screen`](crate::screen)).
 ///
-/// Estimators are tried with a law for each of `structures` and each strength of ridge. The pair with the best score on held-out blocks
-/// determines the law. Every estimator, and the extended Kalman filter in any case, is then fitted to that law; the one of `kinds` with the
+/// Estimators are tried with a law for each of `structures` and each strength of ridge, but for the further candidates of the correction.
+/// The pair with the best score on held-out blocks determines the law. Every estimator, and the extended Kalman filter in any case, is then fitted to that law; the one of `kinds` with the
 /// best score on every row of those blocks becomes the default. Near ties go to the one that keeps hypotheses. [`EstimatorKind::Corrected`]
 /// is the default if it is requested; it corrects the best of its candidates, and is learned last, from the same rows.
 ///

@@ -172,7 +172,7 @@ mod tests {
             let identity = DMatrix::identity(matrix.nrows(), matrix.nrows());
             let of_triangle = expected.l_dirty().solve_lower_triangular(&identity).unwrap();
             assert_eq!(lower_inverse(factor.l_dirty()), of_triangle);
-            // Rounding of n products, times the condition number, which is below the trace of both.
+            // Rounding of n products, times the condition number, which is below the product of both traces.
             let (whole, n) = (expected.inverse(), matrix.nrows() as f64);
             let rounding = n * f64::EPSILON * matrix.trace() * whole.trace() * whole.amax();
             assert!((inverse(&factor) - whole).amax() <= rounding);

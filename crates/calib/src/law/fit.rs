@@ -60,7 +60,7 @@ const DEFAULT_GAUGE: GaugeFamily = GaugeFamily::Polynomial;
 /// Number of time constants on the grid.
 const GRID: usize = 12;
 /// Ridges tried, relative to the variance of each column. The least one explains most, but often makes a filter lock onto the wrong
-/// direction; each estimator chooses by its own score.
+/// direction; the scores of the estimators choose.
 const LAW_RIDGES: [f64; 5] = [0.1, 0.03, 0.01, 0.003, 0.001];
 /// Steps of the polish of the time constants, and the side of its first simplex in ln τ.
 const POLISH_ENDS: Ends = Ends { iterations: 40, least_gain: 0.0 };

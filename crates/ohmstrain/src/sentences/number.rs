@@ -1,4 +1,4 @@
-//! Numbers for people: only significant digits, and a true minus sign.
+//! Numbers for people: only significant digits, and a true minus sign; the median of several.
 
 use ohmstrain_sensor::Quantity;
 
@@ -137,6 +137,21 @@ fn superscript(c: char) -> char {
         '3' => '³',
         '0' | '4'..='9' => char::from_u32(0x2070 + u32::from(c) - u32::from('0')).unwrap_or(c),
         other => other,
+    }
+}
+
+/// Returns the median of numbers; `None` if there are none.
+///
+/// ```
+/// assert_eq!(ohmstrain::number::median(vec![3.0, 1.0, 2.0, 9.0]), Some(2.5));
+/// ```
+#[must_use]
+pub fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    match values.len() {
+        0 => None,
+        n if n % 2 == 1 => Some(values[n / 2]),
+        n => Some(0.5 * (values[n / 2 - 1] + values[n / 2])),
     }
 }
 

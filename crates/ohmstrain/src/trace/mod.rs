@@ -23,7 +23,7 @@ use crate::{Error, Reading, Recording, Sensor};
 pub use calibrate::{Refusal, calibrate, distrusted_rows, tested_on};
 pub use hand::{HAND_FORMAT, HandChannel, HandDescription, HandError, HandJoint};
 pub use marks::{Marked, take_marks};
-pub use watched::{FIRST_LIVE_READINGS, WatchedFilter, median};
+pub use watched::{FIRST_LIVE_READINGS, WatchedFilter};
 
 /// A recording in memory.
 #[derive(Clone, Debug)]

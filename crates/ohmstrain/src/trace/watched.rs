@@ -2,8 +2,8 @@ use ohmstrain_bench_data::Row;
 
 use super::reading;
 use crate::known::KNOWN_TO;
-use crate::number::significant;
-use crate::{Error, Estimate, Filter, FilterBuilder, Interface, QuietWatch, Sensor, UnitDoubt, ValidityWatch};
+use crate::number::{median, significant};
+use crate::{Error, Estimate, Filter, FilterBuilder, Interface, Known, QuietWatch, Sensor, UnitDoubt, ValidityWatch};
 
 /// Number of first readings whose unit is checked if a reader waits for each row.
 pub const FIRST_LIVE_READINGS: usize = 20;
@@ -22,6 +22,8 @@ pub struct WatchedFilter {
     rest_of_first: usize,
     /// The first known readings.
     early: Vec<f64>,
+    /// Time of the last row, s.
+    last_s: f64,
 }
 
 impl WatchedFilter {
@@ -30,9 +32,17 @@ impl WatchedFilter {
     /// # Errors
     /// As [`FilterBuilder::build`].
     pub fn new(wanted: FilterBuilder, rest_of_first: usize) -> Result<Self, Error> {
-        let (validity, quiet) = watches(&wanted);
-        let (filter, sensor) = (wanted.build()?, wanted.sensor.clone());
-        Ok(Self { filter, sensor, validity, quiet, rest: wanted.rest_resistance, rest_of_first, early: vec![] })
+        let (sensor, rest, known) = (wanted.sensor.clone(), wanted.rest_resistance, wanted.known);
+        Ok(Self {
+            filter: wanted.build()?,
+            validity: ValidityWatch::new(&sensor, rest),
+            quiet: QuietWatch::new(&sensor, rest, known),
+            sensor,
+            rest,
+            rest_of_first,
+            early: vec![],
+            last_s: f64::NEG_INFINITY,
+        })
     }
 
     /// Begins anew with another filter, for another clock or header; R₀ and the first readings remain.
@@ -43,8 +53,15 @@ impl WatchedFilter {
         let wanted = self.rest.map_or(wanted, |measured| wanted.rest_resistance(measured));
         self.filter = wanted.build()?;
         self.sensor = wanted.sensor.clone();
-        (self.validity, self.quiet) = watches(&wanted);
+        self.last_s = f64::NEG_INFINITY;
+        self.watch(wanted.known);
         Ok(())
+    }
+
+    /// Watches the filter anew, which is told these strains.
+    fn watch(&mut self, known: &[Known]) {
+        self.validity = ValidityWatch::new(&self.sensor, self.rest);
+        self.quiet = QuietWatch::new(&self.sensor, self.rest, known);
     }
 
     /// Takes a row, and returns its estimate.
@@ -52,10 +69,13 @@ impl WatchedFilter {
     /// # Errors
     /// As [`Filter::step`].
     pub fn step(&mut self, row: &Row) -> Result<Estimate, Error> {
-        self.filter.step(row.time_s, reading(&row.reading))
+        let estimate = self.filter.step(row.time_s, reading(&row.reading))?;
+        self.last_s = row.time_s;
+        Ok(estimate)
     }
 
-    /// Returns a remark on the last row, if there is one; `rested` tells the person how to answer that the sensor is at rest.
+    /// Watches a row after its step, and determines R₀ with the last of the first readings, if that was asked for. Returns a remark on the
+    /// row, if there is one; `rested` tells the person how to answer that the sensor is at rest.
     ///
     /// # Errors
     /// If the median of the first readings cannot be R₀.
@@ -77,10 +97,12 @@ impl WatchedFilter {
             return Ok(None);
         }
         self.early.push(reading);
-        if self.early.len() == self.rest_of_first {
-            self.rest = median(self.early.clone());
-            self.rest.map_or(Ok(()), |measured| self.filter.rest_resistance(measured))?;
-            self.validity = ValidityWatch::new(&self.sensor, self.rest);
+        if self.early.len() == self.rest_of_first
+            && let Some(measured) = median(self.early.clone())
+        {
+            self.filter.rest_resistance(measured)?;
+            self.rest = Some(measured);
+            self.watch(&self.quiet.known.clone());
         }
         let doubt = || self.sensor.check_unit(self.early.iter().copied(), self.rest).err();
         Ok((self.early.len() == enough).then(doubt).flatten())
@@ -94,35 +116,22 @@ impl WatchedFilter {
         self.filter.know(0.0, KNOWN_TO * self.sensor.params().limits.span()).map(|_| ())
     }
 
-    /// Makes a reading R₀ and begins anew at zero, unless the sensor's range excludes it. Returns true if it begins there.
+    /// Makes a reading R₀, whatever the first readings say, and begins anew at zero, unless the sensor's range excludes it. Of the known
+    /// strains those after the last row apply. Returns true if it begins at zero.
     ///
     /// # Errors
     /// As [`FilterBuilder::build`]. The filter then stays as it was.
     pub fn zero(&mut self, wanted: FilterBuilder, rest: f64) -> Result<bool, Error> {
-        let wanted = wanted.rest_resistance(rest);
+        let to_come: Vec<Known> = wanted.known.iter().filter(|known| known.time_s > self.last_s).copied().collect();
+        let mut wanted = wanted.known(&to_come).rest_resistance(rest);
+        wanted.initial_strain = None;
         let at_zero = wanted.initial_strain(0.0).build();
         let begins_there = at_zero.is_ok();
         self.filter = at_zero.or_else(|_| wanted.build())?;
-        self.rest = Some(rest);
+        self.sensor = wanted.sensor.clone();
+        (self.rest, self.rest_of_first) = (Some(rest), 0);
         // Strains that need no question remain those of this clock.
-        (self.validity, self.quiet) = watches(&wanted.known(&self.quiet.known.clone()));
+        self.watch(&self.quiet.known.clone());
         Ok(begins_there)
-    }
-}
-
-/// Creates the watches of a filter.
-fn watches(wanted: &FilterBuilder) -> (ValidityWatch, QuietWatch) {
-    let (sensor, rest) = (wanted.sensor, wanted.rest_resistance);
-    (ValidityWatch::new(sensor, rest), QuietWatch::new(sensor, rest, wanted.known))
-}
-
-/// Returns the median of numbers; `None` if there are none.
-#[must_use]
-pub fn median(mut known: Vec<f64>) -> Option<f64> {
-    known.sort_by(f64::total_cmp);
-    match known.len() {
-        0 => None,
-        n if n % 2 == 1 => Some(known[n / 2]),
-        n => Some(0.5 * (known[n / 2 - 1] + known[n / 2])),
     }
 }

@@ -2,7 +2,8 @@
 
 use std::io;
 
-use ohmstrain::trace::{HandDescription, median};
+use ohmstrain::number::median;
+use ohmstrain::trace::HandDescription;
 use ohmstrain_bench_data::{Headed, Metadata, Row};
 
 use super::Shown;

@@ -2,9 +2,9 @@
 
 use std::io;
 
-use ohmstrain::number::significant;
-use ohmstrain::trace::{self, WatchedFilter, check_unit, median};
-use ohmstrain::{Error, Estimate, Sensor, Thermometer};
+use ohmstrain::number::{median, significant};
+use ohmstrain::trace::{self, WatchedFilter, check_unit};
+use ohmstrain::{Error, Estimate, FilterBuilder, Sensor, Thermometer};
 use ohmstrain_bench_data::{Headed, Line, LineParser, Row};
 
 use super::Shown;
@@ -110,8 +110,7 @@ impl<'a> Session<'a> {
 
     /// Starts a new filter.
     fn begin(&mut self) -> Result<(), Error> {
-        let anew = self.track.pulse.counts.restarts > 0;
-        let wanted = if anew { builder_anew } else { builder }(&self.sensor, &self.args.estimate);
+        let wanted = wanted(self.args, &self.sensor, &self.track);
         self.filter.begin(wanted)?;
         self.track.pulse.restart();
         Ok(())
@@ -124,6 +123,11 @@ impl<'a> Session<'a> {
         self.restarted("the clock has started again, and so has the filter");
         Ok(())
     }
+}
+
+/// Returns the builder of the filter on the present clock.
+fn wanted<'b>(args: &'b LiveArgs, sensor: &'b Sensor, track: &Track<Point>) -> FilterBuilder<'b> {
+    if track.pulse.counts.restarts > 0 { builder_anew(sensor, &args.estimate) } else { builder(sensor, &args.estimate) }
 }
 
 impl Taker for Session<'_> {
@@ -198,7 +202,7 @@ impl Shown for Session<'_> {
         }
         let count = readings.len();
         let Some(rest) = median(readings) else { return Ok(()) };
-        self.track.message = match self.filter.zero(builder(&self.sensor, &self.args.estimate), rest) {
+        self.track.message = match self.filter.zero(wanted(self.args, &self.sensor, &self.track), rest) {
             Err(refused) => format!("R0 stays as it was: {refused}"),
             Ok(at_zero) => {
                 self.track.pulse.restart();
