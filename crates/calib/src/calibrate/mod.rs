@@ -362,7 +362,7 @@ fn refined(
     let found = |kind: EstimatorKind| surveyed.iter().find(|one| one.kind == kind && std::ptr::eq(one.law, fit));
     let (from, search) = match (found(kind), asked.first_before(kind).and_then(found)) {
         (Some(own), _) => (own.tuned.point.clone(), REFINEMENT),
-        (None, Some(first)) => (problem.from_end_of(&first.tuned), FURTHER),
+        (None, Some(first)) => (problem.begun_at_end_of(&first.tuned), FURTHER),
         (None, None) => (problem.search(None, SURVEY, &mut *evaluated)?.point, REFINEMENT),
     };
     problem.refine(&from, search, &mut *evaluated)

@@ -161,7 +161,7 @@ impl<'a> NoiseProblem<'a> {
     }
 
     /// Returns the start of a search for this estimator, with noise and motion where another one's search ended; with a prior, its means.
-    pub(crate) fn from_end_of(&self, other: &Tuned) -> Vec<f64> {
+    pub(crate) fn begun_at_end_of(&self, other: &Tuned) -> Vec<f64> {
         if self.of_make.is_some() {
             return self.untuned.clone();
         }
