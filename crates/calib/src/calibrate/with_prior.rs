@@ -12,9 +12,10 @@ const ALONE: f64 = 1.0 / 3.0;
 /// recordings. Outliers, and rows far from the law, are left out ([`screen`](crate::screen)).
 ///
 /// Estimators are tried with a law for each of `structures` and each strength of ridge, but for the further candidates of the correction.
-/// The pair with the best score on held-out blocks determines the law. Every estimator, and the extended Kalman filter in any case, is then fitted to that law; the one of `kinds` with the
-/// best score on every row of those blocks becomes the default. Near ties go to the one that keeps hypotheses. [`EstimatorKind::Corrected`]
-/// is the default if it is requested; it corrects the best of its candidates, and is learned last, from the same rows.
+/// The pair with the best score on held-out blocks determines the law. Every estimator, and the extended Kalman filter in any case, is then
+/// fitted to that law; the one of `kinds` with the best score on every row of those blocks becomes the default. Near ties go to the one that
+/// keeps hypotheses. [`EstimatorKind::Corrected`] is the default if it is requested; it corrects the best of its candidates, and is learned
+/// last, from the same rows.
 ///
 /// A prior is for one more sensor of a known make. It determines the law's structure; `structures` applies only without one. Noise and
 /// motion start from the prior, and the filter that the others correct is the only candidate for a correction.
