@@ -77,13 +77,15 @@ def cases():
         for material in ("ecoflex-00-30", "vytaflex-10"):
             words = ("--protocol", protocol, *protocols[protocol], "--material", material, "--seed", 1, "--sample-rate-hz", 10)
             found.append(of(f"protocol {protocol}, tested with `--until`", *words, is_tested=True))
-    for rate in (2, 20, 100):
-        for seed in (3, 4):
-            found.append(of(f"rate {rate} Hz", *mixed, "--seed", seed, "--sample-rate-hz", rate))
-    for seed in (5, 6):
-        found.append(of("start in mid-motion", *mixed, "--seed", seed, "--sample-rate-hz", 10, is_started_late=True))
-        for pause in (5, 60):
-            found.append(of(f"pause of {pause} s", *mixed, "--seed", seed, "--sample-rate-hz", 10, pause_s=pause))
+    for material in ("ecoflex-00-30", "ecoflex-00-50", "vytaflex-10"):
+        for rate in (2, 20, 100):
+            for seed in (3, 4):
+                found.append(of(f"rate {rate} Hz", *mixed, "--material", material, "--seed", seed, "--sample-rate-hz", rate))
+        for seed in (5, 6):
+            words = (*mixed, "--material", material, "--seed", seed, "--sample-rate-hz", 10)
+            found.append(of("start in mid-motion", *words, is_started_late=True))
+            for pause in (5, 60):
+                found.append(of(f"pause of {pause} s", *words, pause_s=pause))
     return found
 
 

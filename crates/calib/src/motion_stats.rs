@@ -1,6 +1,7 @@
 use crate::order::{self, sorted};
 use crate::samples::central_rate;
 use crate::samples::{Samples, filled_strain};
+use ohmstrain_sensor::RangeParams;
 
 /// Statistics of the strain's motion in the recordings.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,6 +65,12 @@ impl MotionStats {
             longest_s,
             distances: phases.distances,
         }
+    }
+
+    /// Returns the number of strokes: the distance of all movements over this range.
+    pub(crate) fn strokes(&self, range: RangeParams) -> f64 {
+        let [stretched, released] = self.distances;
+        (stretched + released) / range.span().max(f64::MIN_POSITIVE)
     }
 }
 

@@ -84,7 +84,7 @@ impl Sensor {
         }
         let tested = Tested { filter: score(&rows.filter)?, static_cubic: score(&rows.static_cubic)? };
         let is_known = tested.filter.rmse_percent_fs.is_finite();
-        is_known.then(|| (tested, unstated(&rows.filter, &rows.smoother)))
+        is_known.then(|| (tested, unstated(&rows.filter, &rows.smoother, 1.0)))
     }
 }
 

@@ -204,7 +204,8 @@ fn calibrate_arranged(
     (steps.progress)(Stage::LeftOut);
     let identifiability = identifiability(recordings, &fit.law.law).ok();
     let seen = seen(recordings, limits, &stats);
-    let checked = Check { recordings, fit, kind: default_estimator, filter, estimators: &estimators, of_make }
+    let strokes = stats.strokes(limits);
+    let checked = Check { recordings, strokes, fit, kind: default_estimator, filter, estimators: &estimators, of_make }
         .checked(seen, &identifiability);
     let (unstated, findings, left_out) = checked.map_or_else(Default::default, |checked| {
         let Checked { findings, unstated, rows } = checked;

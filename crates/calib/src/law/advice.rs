@@ -69,8 +69,7 @@ fn both_directions(stats: &MotionStats, stroke_s: f64) -> Option<String> {
 
 /// Advises more strokes if a block that is left out to test a law would not contain a motion.
 fn enough_strokes(stats: &MotionStats, range: RangeParams, stroke_s: f64) -> Option<String> {
-    let strokes = (stats.distances[0] + stats.distances[1]) / range.span().max(f64::MIN_POSITIVE);
-    if strokes < FEWEST_STROKES {
+    if stats.strokes(range) < FEWEST_STROKES {
         let [stroke, all] = [stroke_s, 2.0 * FEWEST_STROKES * stroke_s].map(duration);
         let times = 2.0 * FEWEST_STROKES;
         return Some(format!(
