@@ -179,7 +179,7 @@ where
         let innovation = step.update.map(|update| Innovation {
             value: update.innovation,
             variance: update.innovation_variance,
-            nis: update.innovation * update.innovation / update.innovation_variance,
+            nis: update.nis,
             log_likelihood: update.log_likelihood,
         });
         Ok(Advanced { state: step.posterior, innovation })

@@ -84,10 +84,7 @@ impl<T: Real> Estimate<T> {
         settling: &Settling<T>,
     ) -> Self {
         let belief = &state.moments();
-        let strain_of = |belief: &Belief<T, N, L>| {
-            let strain = Gaussian { mean: belief.mean[0], variance: belief.covariance[(0, 0)] };
-            reported(strain, strain_sd_scale, limits)
-        };
+        let strain_of = |belief: &Belief<T, N, L>| reported(Gaussian::marginal(belief, 0), strain_sd_scale, limits);
         let (strain, rate) = (strain_of(belief), Gaussian::marginal(belief, 1));
         let border = model.law().static_border();
         let mut beyond_border = T::zero();

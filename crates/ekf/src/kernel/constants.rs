@@ -190,18 +190,12 @@ impl<V: Lanes, const B: usize> GainsAt<'_, V, B> {
 
     #[inline(always)]
     pub(super) fn extend(&self) -> Gain<V> {
-        match self.common {
-            Some(row) => row[self.i].extend.in_lanes(self.strain_sum),
-            None => self.chosen(|gains| &gains.extend),
-        }
+        self.gain(|gains| &gains.extend)
     }
 
     #[inline(always)]
     pub(super) fn retract(&self) -> Gain<V> {
-        match self.common {
-            Some(row) => row[self.i].retract.in_lanes(self.strain_sum),
-            None => self.chosen(|gains| &gains.retract),
-        }
+        self.gain(|gains| &gains.retract)
     }
 
     /// Returns the gain for the direction in each lane.
@@ -220,7 +214,10 @@ impl<V: Lanes, const B: usize> GainsAt<'_, V, B> {
     }
 
     #[inline(always)]
-    fn chosen(&self, of: impl Fn(&Gains<V::Number>) -> &Gain<V::Number>) -> Gain<V> {
+    fn gain(&self, of: impl Fn(&Gains<V::Number>) -> &Gain<V::Number>) -> Gain<V> {
+        if let Some(row) = self.common {
+            return of(&row[self.i]).in_lanes(self.strain_sum);
+        }
         let regions = self.regions;
         let [below, within, above] =
             [of(&regions.below[self.i]), of(&regions.within[self.i]), of(&regions.above[self.i])];

@@ -41,7 +41,7 @@ fn next<'a, V: Lanes + 'a>(numbers: &mut impl Iterator<Item = &'a V>, nothing: V
 
 impl<V: Lanes, const B: usize> Part<V, B> {
     #[inline(always)]
-    const fn vacant(nothing: V) -> Self {
+    pub(crate) const fn vacant(nothing: V) -> Self {
         Self { mean: nothing, with_strain: nothing, with_rate: nothing, with: [nothing; B], variance: nothing }
     }
 

@@ -91,19 +91,10 @@ impl<T: Scalar, S, const B: usize, const N: usize, G> SparseEkf<T, S, B, N, G> {
     pub(crate) const HAS_BASELINE: bool = Parts::<T, B>::has_baseline(N);
 
     /// Predicts one step ahead. With an uncertain course, every branch splits its rate with the variance of the rate in the
-    /// middle of the step. Returns the spread of the rate for the split in the update.
+    /// middle of the step; only then is the switch used, the caller's because the filter's may not support these lanes. Returns
+    /// the spread of the rate for the split in the update.
     #[inline(always)]
-    pub(crate) fn predict<V: Lanes<Number = T>>(&self, parts: &mut Parts<V, B>, course: Course<V>) -> RateSpread<V, S>
-    where
-        S: Switch<V>,
-    {
-        self.predict_as(parts, course)
-    }
-
-    /// Predicts with the caller's switch, because the filter's switch may not support these lanes. Only an uncertain course uses
-    /// it.
-    #[inline(always)]
-    pub(crate) fn predict_as<V: Lanes<Number = T>, X: Switch<V>>(
+    pub(crate) fn predict<V: Lanes<Number = T>, X: Switch<V>>(
         &self,
         parts: &mut Parts<V, B>,
         course: Course<V>,

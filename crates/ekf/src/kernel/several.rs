@@ -165,7 +165,10 @@ pub(crate) trait Work<T> {
 pub(crate) trait InVectors: Scalar {
     /// Does the work with vectors if the processor has suitable ones. They round like scalars: results are the same to the
     /// last bit.
-    fn in_vectors<W: Work<Self>>(work: W) -> Option<W::Output>;
+    #[inline(always)]
+    fn in_vectors<W: Work<Self>>(_work: W) -> Option<W::Output> {
+        None
+    }
     /// Constants of [`falling`](super::Falls::falling) in this precision.
     const FALLING: Falling<Self>;
     /// Returns the number with its bits shifted into the exponent.
@@ -174,11 +177,6 @@ pub(crate) trait InVectors: Scalar {
 }
 
 impl InVectors for f32 {
-    #[inline(always)]
-    fn in_vectors<W: Work<Self>>(_: W) -> Option<W::Output> {
-        None
-    }
-
     /// The Taylor series to r⁷ has an error of r⁸/8! < 6e-9. e⁻⁸⁷ is still a normal number.
     const FALLING: Falling<Self> = Falling {
         least: -87.0,
@@ -226,11 +224,5 @@ impl InVectors for f64 {
             #[inline(always)]
             || work.with_lanes(like),
         ))
-    }
-
-    #[cfg(not(all(feature = "simd", any(target_arch = "x86_64", target_feature = "simd128"))))]
-    #[inline(always)]
-    fn in_vectors<W: Work<Self>>(_: W) -> Option<W::Output> {
-        None
     }
 }

@@ -15,7 +15,7 @@ use core::marker::PhantomData;
 
 use ohmstrain_model::{Scalar, SwitchedModel};
 
-use super::{AnyCurve, Course, Curve, Gains, Parts, RateSpread, ReadingLaw, Regions, StepConstants, Switch};
+use super::{AnyCurve, Course, Curve, Gains, Parts, RateSpread, ReadingLaw, Regions, StepConstants, Switch, refusal};
 use crate::clock::check_time_step;
 use crate::{Belief, Reading, Residual, StepError};
 
@@ -109,10 +109,7 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         belief: &mut Belief<T, N, L>,
         reading: Option<Reading<T>>,
     ) -> Result<Option<Residual<T>>, StepError> {
-        match self.step_once(belief, reading) {
-            Err(refused) => self.retry_step(belief, reading, refused, Self::step_once),
-            taken => taken,
-        }
+        self.step_with(belief, reading, None)
     }
 
     /// Steps with a gate: a reading whose normalised innovation squared exceeds `gate` is compared but not taken. The gate is
@@ -130,8 +127,19 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         reading: Reading<T>,
         gate: T,
     ) -> Result<Residual<T>, StepError> {
-        match self.gated_once(belief, reading, gate) {
-            Err(refused) => self.retry_gated(belief, reading, gate, refused),
+        // A reading always has a residual.
+        self.step_with(belief, Some(reading), Some(gate))?.ok_or(StepError::NonFiniteState)
+    }
+
+    #[inline(always)]
+    fn step_with<const L: usize>(
+        &self,
+        belief: &mut Belief<T, N, L>,
+        reading: Option<Reading<T>>,
+        gate: Option<T>,
+    ) -> Result<Option<Residual<T>>, StepError> {
+        match self.step_once(belief, reading, gate) {
+            Err(refused) => self.retry_step(belief, reading, gate, refused),
             taken => taken,
         }
     }
@@ -142,46 +150,24 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         &self,
         belief: &mut Belief<T, N, L>,
         reading: Option<Reading<T>>,
+        gate: Option<T>,
     ) -> Result<Option<Residual<T>>, StepError> {
         let mut parts = Parts::of(belief);
-        let spread = self.predict(&mut parts, Course::Uncertain);
+        let spread = self.predict::<T, S>(&mut parts, Course::Uncertain);
         let residual = match reading {
-            Some(reading) => Some(self.update(&mut parts, reading, None, spread, None)?),
+            Some(reading) => {
+                let is_taken = |nis| gate.is_none_or(|gate| nis <= gate);
+                let (residual, sound) = self.update(&mut parts, reading, None, spread, true, is_taken);
+                if !sound {
+                    return Err(refusal(Some(reading), &residual));
+                }
+                Some(residual)
+            }
             None if parts.is_sound::<N>(parts.variances::<N>()) => None,
             None => return Err(StepError::NonFiniteState),
         };
         parts.put_into(belief);
         Ok(residual)
-    }
-
-    /// See [`Self::step_once`].
-    #[inline(never)]
-    fn gated_once<const L: usize>(
-        &self,
-        belief: &mut Belief<T, N, L>,
-        reading: Reading<T>,
-        gate: T,
-    ) -> Result<Residual<T>, StepError> {
-        let mut parts = Parts::of(belief);
-        let spread = self.predict(&mut parts, Course::Uncertain);
-        let residual = self.update(&mut parts, reading, None, spread, Some(gate))?;
-        parts.put_into(belief);
-        Ok(residual)
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn retry_gated<const L: usize>(
-        &self,
-        belief: &mut Belief<T, N, L>,
-        reading: Reading<T>,
-        gate: T,
-        refused: StepError,
-    ) -> Result<Residual<T>, StepError> {
-        let gated = |_: &Self, belief: &mut Belief<T, N, L>, reading: Option<Reading<T>>| {
-            reading.map(|reading| self.gated_once(belief, reading, gate)).transpose()
-        };
-        self.retry_step(belief, Some(reading), refused, gated)?.ok_or(refused)
     }
 
     /// Repeats a `refused` step with increasing noise of the reading.
@@ -191,14 +177,14 @@ impl<T: Scalar, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> Spars
         &self,
         belief: &mut Belief<T, N, L>,
         mut reading: Option<Reading<T>>,
+        gate: Option<T>,
         mut refused: StepError,
-        once: impl Fn(&Self, &mut Belief<T, N, L>, Option<Reading<T>>) -> Result<Option<Residual<T>>, StepError>,
     ) -> Result<Option<Residual<T>>, StepError> {
         let mut tries = 0;
         loop {
             tries += 1;
             reading = Some(self.coarser(reading, tries, refused)?);
-            match once(self, belief, reading) {
+            match self.step_once(belief, reading, gate) {
                 Err(error) => refused = error,
                 taken => return taken,
             }

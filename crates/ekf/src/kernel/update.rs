@@ -90,14 +90,6 @@ impl<T: Scalar, G: Curve<T>> ReadingLaw<T, G> {
     }
 }
 
-impl<V: Lanes, const B: usize> Compared<V, B> {
-    /// Returns the normalised innovation squared.
-    #[inline(always)]
-    pub(crate) fn nis(&self) -> V {
-        self.innovation * (self.innovation * self.variance.recip())
-    }
-}
-
 impl<V: Lanes> OfMotion<V> {
     /// Adds a dash-pot whose direction is known.
     #[inline(always)]
@@ -107,50 +99,25 @@ impl<V: Lanes> OfMotion<V> {
 }
 
 impl<T: Scalar, S, const B: usize, const N: usize, G: Curve<T>> SparseEkf<T, S, B, N, G> {
-    /// Takes a reading, unless there is a `gate` and its NIS exceeds it. `phase` is a hypothesis, as for
-    /// [`Channel::observe`](crate::Channel::observe); with `None` the rate is split using its variance in `spread`. After an
-    /// error `parts` is meaningless.
+    /// Takes readings in the lanes `present`, or only compares them if `takes` is false for their NIS. `phase` is a hypothesis, as for
+    /// [`Channel::observe`](crate::Channel::observe); with `None` the rate is split using its variance in `spread`. Returns the
+    /// comparison, and the lanes with a valid result; in others `parts` is meaningless.
     #[inline(always)]
-    pub(crate) fn update(
-        &self,
-        parts: &mut Parts<T, B>,
-        reading: Reading<T>,
-        phase: Option<Phase>,
-        spread: RateSpread<T, S>,
-        gate: Option<T>,
-    ) -> Result<Residual<T>, StepError>
-    where
-        S: Switch<T>,
-    {
-        let compared = self.compare(parts, reading, phase, spread);
-        let Compared { innovation, variance, .. } = compared;
-        let nis = compared.nis();
-        if gate.is_none_or(|gate| nis <= gate) {
-            Self::correct(parts, &compared, true);
-        }
-        let residual = Residual { innovation, variance, nis };
-        // If S and ν²/S are finite and S is positive, everything before was finite. If no variance is negative, no gain can
-        // have overflowed (Cauchy-Schwarz). Only the means remain to be checked.
-        if variance > T::zero() && !(reading.extra_variance < T::zero()) && parts.is_sound::<N>(variance + nis) {
-            Ok(residual)
-        } else {
-            Err(refusal(reading, &residual))
-        }
-    }
-
-    /// Takes readings in the lanes `present`. Returns the comparison, and the lanes with a valid result.
-    #[inline(always)]
-    pub(crate) fn update_where<V: Several<Number = T>, X: Switch<V>>(
+    pub(crate) fn update<V: Several<Number = T>, X: Switch<V>>(
         &self,
         parts: &mut Parts<V, B>,
         reading: Reading<V>,
         phase: Option<Phase>,
         spread: RateSpread<V, X>,
         present: V::Mask,
+        takes: impl FnOnce(V) -> bool,
     ) -> (Residual<V>, V::Mask) {
         let compared = self.compare(parts, reading, phase, spread);
-        let nis = Self::correct(parts, &compared, present);
         let Compared { innovation, variance, .. } = compared;
+        let mut nis = innovation * (innovation * variance.recip());
+        if takes(nis) {
+            nis = Self::correct(parts, &compared, present);
+        }
         // If S and ν²/S are finite and S is positive, everything before was finite. If no variance is negative, no gain can
         // have overflowed (Cauchy-Schwarz). Only the means remain to be checked.
         let mut sound = V::both(variance.nothing().less(variance), reading.extra_variance.not_negative());
@@ -263,9 +230,10 @@ fn take<V: Lanes, const B: usize>(
     part.variance = minus_gain.mul_add(own, part.variance);
 }
 
-/// Returns the reason for refusing a reading.
+/// Returns the reason for refusing a step, with a reading or without.
 #[cold]
-pub(crate) fn refusal<T: Scalar>(reading: Reading<T>, residual: &Residual<T>) -> StepError {
+pub(crate) fn refusal<T: Scalar>(reading: Option<Reading<T>>, residual: &Residual<T>) -> StepError {
+    let Some(reading) = reading else { return StepError::NonFiniteState };
     let Residual { innovation, variance, .. } = *residual;
     if !(reading.value.is_finite() && reading.extra_variance.is_finite()) {
         StepError::NonFiniteReading

@@ -122,8 +122,8 @@ macro_rules! over_phases {
 }
 pub(crate) use over_phases;
 
-/// Steps of a filter whose `step_recorded` builds a new [`Mixture`](crate::Mixture): forward, and backwards along the same
-/// children.
+/// Steps of a filter that [spawns](crate::mixture::spawn::Spawns) a new [`Mixture`](crate::Mixture): forward, and backwards
+/// along the same children.
 macro_rules! mixture_steps {
     () => {
         /// Predicts one step ahead and takes the reading. Without a reading it only predicts, and returns `None`.
@@ -136,72 +136,13 @@ macro_rules! mixture_steps {
             state: &mut Mixture<T, N, L, K>,
             reading: Option<Reading<T>>,
         ) -> Result<Option<MixtureResidual<T>>, StepError> {
-            match reading {
-                Some(reading) => self.step_with(state, reading),
-                None => self.step_with(state, reading),
-            }
-        }
-
-        #[inline(always)]
-        fn step_with<const L: usize>(
-            &self,
-            state: &mut Mixture<T, N, L, K>,
-            reading: impl StepReading<T>,
-        ) -> Result<Option<MixtureResidual<T>>, StepError> {
-            match self.step_once(state, reading) {
-                Err(refused) => {
-                    self.retry_step(state, reading, refused, |state, reading| self.step_once(state, reading))
-                }
-                taken => taken,
-            }
-        }
-
-        /// Steps once. Never inlined, so that a program that steps in place contains it once, for all tries.
-        #[inline(never)]
-        fn step_once<const L: usize>(
-            &self,
-            state: &mut Mixture<T, N, L, K>,
-            reading: impl StepReading<T>,
-        ) -> Result<Option<MixtureResidual<T>>, StepError> {
             let mut next = Mixture::empty();
-            let residual = self.step_recorded(state, reading.as_option(), &mut next, &mut ())?;
+            let residual = match reading {
+                Some(reading) => self.step_to(state, reading, &mut next),
+                None => self.step_to(state, reading, &mut next),
+            }?;
             *state = next;
             Ok(residual)
-        }
-
-        /// Steps once into another state. Never inlined, for the same reason.
-        #[inline(never)]
-        fn step_to<const L: usize>(
-            &self,
-            state: &Mixture<T, N, L, K>,
-            reading: Option<Reading<T>>,
-            next: &mut Mixture<T, N, L, K>,
-        ) -> Result<Option<MixtureResidual<T>>, StepError> {
-            self.step_recorded(state, reading, next, &mut ())
-        }
-
-        #[cold]
-        #[inline(never)]
-        fn retry_step<const L: usize, H: StepReading<T>>(
-            &self,
-            state: &mut Mixture<T, N, L, K>,
-            mut reading: H,
-            mut refused: StepError,
-            once: impl Fn(&mut Mixture<T, N, L, K>, H) -> Result<Option<MixtureResidual<T>>, StepError>,
-        ) -> Result<Option<MixtureResidual<T>>, StepError> {
-            let (mut from, mut tries) = (*state, 0);
-            loop {
-                tries += 1;
-                reading = reading.for_retry(&self.kernel, tries, refused)?;
-                loosen(from.shares_mut(), tries);
-                match once(&mut from, reading) {
-                    Err(error) => refused = error,
-                    taken => {
-                        *state = from;
-                        return taken;
-                    }
-                }
-            }
         }
 
         /// Writes the result of [`Self::step`] into an existing state, which saves a move.
@@ -215,18 +156,69 @@ macro_rules! mixture_steps {
             reading: Option<Reading<T>>,
             next: &mut Mixture<T, N, L, K>,
         ) -> Result<Option<MixtureResidual<T>>, StepError> {
-            match self.step_to(state, reading, next) {
-                Err(refused) => {
-                    *next = *state;
-                    self.retry_step(next, reading, refused, |state, reading| {
-                        let mut next = Mixture::empty();
-                        let residual = self.step_to(state, reading, &mut next)?;
-                        *state = next;
-                        Ok(residual)
-                    })
-                }
+            self.step_to(state, reading, next)
+        }
+
+        #[inline(always)]
+        fn step_to<const L: usize>(
+            &self,
+            state: &Mixture<T, N, L, K>,
+            reading: impl StepReading<T>,
+            next: &mut Mixture<T, N, L, K>,
+        ) -> Result<Option<MixtureResidual<T>>, StepError> {
+            match self.step_once(state, reading, next) {
+                Err(refused) => self.retry_step(state, reading, refused, next),
                 taken => taken,
             }
+        }
+
+        /// Steps once. Never inlined, so that a program contains it once, for all tries.
+        #[inline(never)]
+        fn step_once<const L: usize>(
+            &self,
+            state: &Mixture<T, N, L, K>,
+            reading: impl StepReading<T>,
+            next: &mut Mixture<T, N, L, K>,
+        ) -> Result<Option<MixtureResidual<T>>, StepError> {
+            self.step_recorded(state, reading.as_option(), next, &mut ())
+        }
+
+        #[cold]
+        #[inline(never)]
+        fn retry_step<const L: usize>(
+            &self,
+            state: &Mixture<T, N, L, K>,
+            mut reading: impl StepReading<T>,
+            mut refused: StepError,
+            next: &mut Mixture<T, N, L, K>,
+        ) -> Result<Option<MixtureResidual<T>>, StepError> {
+            let (mut from, mut tries) = (*state, 0);
+            loop {
+                tries += 1;
+                reading = reading.for_retry(&self.kernel, tries, refused)?;
+                loosen(from.shares_mut(), tries);
+                match self.step_once(&from, reading, next) {
+                    Err(error) => refused = error,
+                    taken => return taken,
+                }
+            }
+        }
+
+        /// Steps once, and passes the children to a recorder.
+        #[inline(always)]
+        fn step_recorded<const L: usize>(
+            &self,
+            state: &Mixture<T, N, L, K>,
+            reading: Option<Reading<T>>,
+            next: &mut Mixture<T, N, L, K>,
+            recorder: &mut impl Recorder<T, B>,
+        ) -> Result<Option<MixtureResidual<T>>, StepError> {
+            let pause = self.pause_after(state.pause(), reading.is_some());
+            let (open, branches) = (pause.open, PhantomData);
+            let residual =
+                MixtureStep { filter: self, state, reading, next: &mut *next, open, branches }.done(recorder)?;
+            next.set_pause(pause);
+            Ok(residual)
         }
 
         fn back<const L: usize>(

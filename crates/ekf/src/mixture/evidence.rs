@@ -226,7 +226,7 @@ impl<T: Real, S: Switch<T>, const B: usize, const N: usize, G: Curve<T>> SparseE
         let mut weight = Weight { factor: prior, exponent: nothing };
         let sound;
         if let Some(reading) = reading {
-            (residual, sound) = self.update_where(parts, reading, Some(phase), spread, alive);
+            (residual, sound) = self.update(parts, reading, Some(phase), spread, alive, |_| true);
             weight = weighing.likelihood::<V, X>(prior, &residual);
         } else {
             sound = parts.is_sound::<N>(parts.variances::<N>());

@@ -39,18 +39,6 @@ pub struct Hypotheses<T, const B: usize, const N: usize, const K: usize, S = Com
 
 impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: Curve<T>> Hypotheses<T, B, N, K, S, G> {
     mixture_steps!();
-
-    #[inline(always)]
-    fn step_recorded<const L: usize>(
-        &self,
-        state: &Mixture<T, N, L, K>,
-        reading: Option<Reading<T>>,
-        next: &mut Mixture<T, N, L, K>,
-        recorder: &mut impl Recorder<T, B>,
-    ) -> Result<Option<MixtureResidual<T>>, StepError> {
-        MixtureStep { filter: self, state, reading, next: &mut *next, open: false, branches: PhantomData }
-            .done(recorder)
-    }
 }
 
 impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: Curve<T>> Spawns<T, B, N>
@@ -101,7 +89,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
         }
         let course = Course::Known(phase);
         trace.starts(parts, begins, &course);
-        let spread = self.kernel.predict_as::<V, X>(parts, course);
+        let spread = self.kernel.predict::<V, X>(parts, course);
         trace.ahead(parts);
         let (prior, per_inside) = (parents.weight * probability, parents.per_inside);
         let children = PredictedChildren { parts, phase, prior, spread, per_inside, alive };

@@ -10,10 +10,10 @@
 use ohmstrain_model::{Phase, SwitchedModel};
 
 use crate::Real;
-use crate::kernel::{Course, Parts};
+use crate::kernel::{Course, Parts, refusal};
 use crate::mixture::LEAST_WEIGHT;
 use crate::mixture::estimator::{mixture_filter, over_phases};
-use crate::mixture::evidence::{Weighing, Weight};
+use crate::mixture::evidence::{PredictedChildren, UpdatedChildren, Weighed, Weighing, Weight};
 use crate::mixture::predicted::Predicted;
 use crate::mixture::retry::{StepReading, loosen};
 use crate::mixture::state::{PhaseMixture, Share};
@@ -41,12 +41,9 @@ pub struct Imm<T, const B: usize, const N: usize, S = Compact, G = AnyCurve<T>> 
 /// A mode during a step.
 struct Mode<T, const B: usize> {
     parts: Parts<T, B>,
-    /// Probability before the reading; `weight` is the one after it.
+    /// Probability before the reading; `weighed` is the one after it.
     prior: T,
-    weight: Weight<T>,
-    /// See [`Weighed`](crate::mixture::evidence::Weighed).
-    more_inside: T,
-    per_inside: T,
+    weighed: Weighed<T>,
     residual: Option<Residual<T>>,
 }
 
@@ -68,26 +65,12 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, 
                 Err(refused) => {
                     tries += 1;
                     let before = before.get_or_insert(*state);
-                    reading = self.prepare_retry(state, reading, tries, refused).inspect_err(|_| *state = *before)?;
+                    reading = reading.for_retry(&self.kernel, tries, refused).inspect_err(|_| *state = *before)?;
+                    loosen(&mut state.modes, tries);
                 }
                 taken => return taken,
             }
         }
-    }
-
-    /// Returns the reading for another try of a refused step, and loosens the correlations of its initial state.
-    #[cold]
-    #[inline(never)]
-    fn prepare_retry<const L: usize>(
-        &self,
-        state: &mut PhaseMixture<T, N, L>,
-        reading: Option<Reading<T>>,
-        tries: u32,
-        refused: StepError,
-    ) -> Result<Option<Reading<T>>, StepError> {
-        let reading = reading.for_retry(&self.kernel, tries, refused)?;
-        loosen(&mut state.modes, tries);
-        Ok(reading)
     }
 
     /// Writes the result of [`Self::step`] into an existing state.
@@ -116,11 +99,11 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, 
         let hold = self.advanced(state, Phase::Hold, reading);
         let retract = self.advanced(state, Phase::Retract, reading);
         let modes = [borrowed(&extend)?, borrowed(&hold)?, borrowed(&retract)?];
-        let (shares, density) = shares(modes.map(|mode| (mode.weight, mode.more_inside)))?;
+        let (shares, density) = shares(modes.map(|mode| (mode.weighed.weight, mode.weighed.more_inside)))?;
         let mut predicted = Predicted::new();
         for ((mode, share), weight) in modes.into_iter().zip(&mut state.modes).zip(shares) {
             share.weight = weight;
-            share.per_inside = mode.per_inside;
+            share.per_inside = mode.weighed.per_inside;
             mode.parts.put_into(&mut share.belief);
             if let Some(residual) = &mode.residual {
                 predicted.add(mode.prior, residual.innovation, residual.variance);
@@ -142,17 +125,14 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, 
         if !(mode.prior > T::zero()) {
             return Ok(mode);
         }
-        let spread = self.kernel.predict(&mut mode.parts, Course::Known(phase));
-        if let Some(reading) = reading {
-            let residual = self.kernel.update(&mut mode.parts, reading, Some(phase), spread, None)?;
-            mode.weight = self.weighing.likelihood::<T, S>(mode.prior, &residual);
-            mode.residual = Some(residual);
-        } else if !mode.parts.is_sound::<N>(mode.parts.variances::<N>()) {
-            return Err(StepError::NonFiniteState);
+        let (parts, prior, per_inside) = (&mut mode.parts, mode.prior, mode.weighed.per_inside);
+        let spread = self.kernel.predict::<T, S>(parts, Course::Known(phase));
+        let child = PredictedChildren { parts, phase, prior, spread, per_inside, alive: true };
+        let UpdatedChildren { sound, residual, weighed, .. } = self.kernel.weigh(child, reading, &self.weighing);
+        if !sound {
+            return Err(refusal(reading, &residual));
         }
-        let Parts { strain, strain_variance, .. } = mode.parts;
-        [mode.more_inside, mode.per_inside] =
-            self.weighing.of_limits::<T, S>((strain, strain_variance), mode.per_inside, true);
+        (mode.weighed, mode.residual) = (weighed, reading.map(|_| residual));
         Ok(mode)
     }
 
@@ -166,8 +146,8 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, 
         let prior = joint[0] + joint[1] + joint[2];
         let weight = Weight { factor: prior, exponent: zero };
         if !(prior > zero) {
-            let (parts, per_inside) = (Parts::of(&own.belief), own.per_inside);
-            return Mode { parts, prior, weight, more_inside: T::one(), per_inside, residual: None };
+            let weighed = Weighed { weight, more_inside: T::one(), per_inside: own.per_inside };
+            return Mode { parts: Parts::of(&own.belief), prior, weighed, residual: None };
         }
         let per_prior = T::one() / prior;
         let shares = joint.map(|weight| weight * per_prior);
@@ -178,7 +158,7 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, 
         if phase != Phase::Hold {
             parts.mix_rate(shares[to], &own.belief, &self.fresh[to]);
         }
-        Mode { parts, prior, weight, more_inside: T::one(), per_inside, residual: None }
+        Mode { parts, prior, weighed: Weighed { weight, more_inside: T::one(), per_inside }, residual: None }
     }
 }
 

@@ -28,11 +28,9 @@ impl<T: Real, const B: usize, const N: usize, S: Switch<T>, G: Curve<T>> Imm<T, 
                 continue;
             }
             let mut parts = Parts::of(&mode.belief);
-            self.kernel.predict(&mut parts, Course::Known(phase));
-            let mut predicted = mode.belief;
-            parts.put_into(&mut predicted);
+            self.kernel.predict::<T, S>(&mut parts, Course::Known(phase));
             let transition = self.model().transition(&step, &mode.belief.mean, Direction::Known(phase));
-            back.belief = rts_step(&mode.belief, &transition, &predicted, &back.belief);
+            back.belief = rts_step(&mode.belief, &transition, &parts.together(), &back.belief);
         }
         let mut smoothed = *filtered;
         mixing.smooth(smoothed.shares_mut(), mixed.shares(), at_start.shares());

@@ -90,7 +90,7 @@ impl<'a, T: Real, const B: usize, const N: usize, const L: usize, const K: usize
     }
 
     fn transition(&self, record: &ChildRecord<'_, T, B>) -> Transition<T, N, L> {
-        let from = whole::<T, B, N, L>(record.from);
+        let from: Belief<T, N, L> = record.from.together();
         let direction = match record.course {
             Course::Known(phase) => Direction::Known(phase),
             Course::Within(phase, turning) => Direction::Within { phase, turning },
@@ -116,8 +116,8 @@ impl<T: Real, const B: usize, const N: usize, const L: usize, const K: usize> Re
         let Weighed { weight, more_inside, .. } = *record.weighed;
         let descent = Descent {
             transition: self.transition(record),
-            predicted: whole(record.predicted),
-            posterior: whole(record.posterior),
+            predicted: record.predicted.together(),
+            posterior: record.posterior.together(),
             log_weight: (weight.factor * more_inside).ln() + weight.exponent,
             component,
         };
@@ -127,12 +127,6 @@ impl<T: Real, const B: usize, const N: usize, const L: usize, const K: usize> Re
     fn renumbered(&mut self, new_place: impl Fn(usize) -> Option<usize>) {
         self.lineage.renumber(new_place);
     }
-}
-
-fn whole<T: Real, const B: usize, const N: usize, const L: usize>(parts: &Parts<T, B>) -> Belief<T, N, L> {
-    let mut belief = Belief { mean: SVector::zeros(), covariance: Symmetric::zeros() };
-    parts.put_into(&mut belief);
-    belief
 }
 
 /// Returns the transition from the state before a phase began: the new rate is independent of the old one, and its

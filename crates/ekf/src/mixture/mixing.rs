@@ -78,23 +78,16 @@ impl<T: Scalar, const B: usize> Parts<T, B> {
         let (mixing, zero) = (Mixing { weights, of }, T::zero());
         let strain = mixing.shift(0);
         let shifts: [Shift<T>; B] = core::array::from_fn(|i| mixing.shift(2 + i));
-        let nothing = Part { mean: zero, with_strain: zero, with_rate: zero, with: [zero; B], variance: zero };
-        let mut branches = [nothing; B];
+        let mut branches = [Part::vacant(zero); B];
         for (i, (branch, own)) in branches.iter_mut().zip(&shifts).enumerate() {
             *branch = mixing.part(own, &strain, shifts.get(..i).unwrap_or(&[]));
         }
-        let baseline =
-            if Self::has_baseline(N) { mixing.part(&mixing.shift(N - 1), &strain, &shifts) } else { nothing };
-        let strain_variance = mixing.entry(&strain, &strain);
-        Self {
-            strain: strain.mean,
-            rate: zero,
-            strain_variance,
-            strain_rate: zero,
-            rate_variance: zero,
-            branches,
-            baseline,
+        let mut baseline = Part::vacant(zero);
+        if Self::has_baseline(N) {
+            baseline = mixing.part(&mixing.shift(N - 1), &strain, &shifts);
         }
+        let strain_variance = mixing.entry(&strain, &strain);
+        Self { strain: strain.mean, strain_variance, branches, baseline, ..Self::certain(zero) }
     }
 
     /// Adds the rate of a moving phase to a mixture: the phase's own with weight `kept`, and otherwise a new one,

@@ -91,25 +91,6 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
     }
 
     mixture_steps!();
-
-    #[inline(always)]
-    fn step_recorded<const L: usize>(
-        &self,
-        state: &Mixture<T, N, L, K>,
-        reading: Option<Reading<T>>,
-        next: &mut Mixture<T, N, L, K>,
-        recorder: &mut impl Recorder<T, B>,
-    ) -> Result<Option<MixtureResidual<T>>, StepError> {
-        let pause = match reading {
-            None => state.pause().goes_on(self.kernel.dt_s(), self.forgets_direction_s),
-            Some(_) => Pause::over(),
-        };
-        let residual =
-            MixtureStep { filter: self, state, reading, next: &mut *next, open: pause.open, branches: PhantomData }
-                .done(recorder)?;
-        next.set_pause(pause);
-        Ok(residual)
-    }
 }
 
 impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: Curve<T>> Spawns<T, B, N>
@@ -119,6 +100,11 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
 
     fn weighing(&self) -> &Weighing<T> {
         &self.weighing
+    }
+
+    #[inline(always)]
+    fn pause_after(&self, before: &Pause<T>, is_read: bool) -> Pause<T> {
+        if is_read { Pause::over() } else { before.goes_on(self.kernel.dt_s(), self.forgets_direction_s) }
     }
 
     #[inline(always)]
@@ -174,7 +160,7 @@ impl<T: Real, const B: usize, const N: usize, const K: usize, S: Switch<T>, G: C
             _ => Course::Known(phase),
         };
         trace.starts(parts, begins, &course);
-        let spread = self.kernel.predict_as::<V, X>(parts, course);
+        let spread = self.kernel.predict::<V, X>(parts, course);
         trace.ahead(parts);
         let mut prior = parents.weight * probability;
         if moves && parents.turning.is_some() {

@@ -10,6 +10,7 @@ use crate::mixture::Added;
 use crate::mixture::children::Children;
 use crate::mixture::evidence::{UpdatedChildren, Weighing};
 use crate::mixture::lineage::{ChildRecord, Recorder};
+use crate::mixture::pause::Pause;
 use crate::mixture::predicted::Predicted;
 use crate::mixture::state::{Mixture, Share};
 use crate::{Compact, MixtureResidual, Reading, Residual, StepError, Switch};
@@ -71,6 +72,12 @@ pub(crate) trait Spawns<T: Real, const B: usize, const N: usize> {
 
     fn weighing(&self) -> &Weighing<T>;
 
+    /// Returns the pause of the readings after a step, given the one before it; over for filters that need none.
+    #[inline(always)]
+    fn pause_after(&self, _before: &Pause<T>, _is_read: bool) -> Pause<T> {
+        Pause::over()
+    }
+
     /// Returns the probabilities of the phases after one; `open` if its direction is not used.
     fn follows(&self, from: Phase, open: bool) -> [T; 3];
 
@@ -113,17 +120,14 @@ impl<F: Spawns<T, B, N>, T: Real, const B: usize, const N: usize, const L: usize
 {
     /// Computes the step in vectors if there are any, unless a recorder follows each child, or directions stay open.
     #[inline(always)]
-    pub(crate) fn done(self, recorder: &mut impl Recorder<T, B>) -> StepResult<T> {
-        let Self { filter, state, reading, next, open, branches } = self;
-        if !records(recorder) && !open {
+    pub(crate) fn done<R: Recorder<T, B>>(self, recorder: &mut R) -> StepResult<T> {
+        if !R::RECORDS && !self.open {
             // A step that fails in vectors is repeated with scalars, which gives the reason.
-            if let Some(Ok(residual)) =
-                T::in_vectors(MixtureStep { filter, state, reading, next: &mut *next, open, branches })
-            {
+            if let Some(Ok(residual)) = T::in_vectors(MixtureStep { next: &mut *self.next, ..self }) {
                 return Ok(residual);
             }
         }
-        MixtureStep { filter, state, reading, next, open, branches }.one_by_one(recorder)
+        self.one_by_one(recorder)
     }
 
     #[inline(always)]
@@ -148,7 +152,7 @@ impl<F: Spawns<T, B, N>, T: Real, const B: usize, const N: usize, const L: usize
                     continue;
                 }
                 let mut child = Parts::of(&share.belief);
-                let mut path = records(recorder).then_some(ChildPath {
+                let mut path = R::RECORDS.then_some(ChildPath {
                     from: child,
                     begins: false,
                     course: Course::Uncertain,
@@ -159,9 +163,7 @@ impl<F: Spawns<T, B, N>, T: Real, const B: usize, const N: usize, const L: usize
                     continue;
                 };
                 if !updated.sound {
-                    return Err(
-                        reading.map_or(StepError::NonFiniteState, |reading| refusal(reading, &updated.residual))
-                    );
+                    return Err(refusal(reading, &updated.residual));
                 }
                 let added = collect(&mut children, &mut predicted, (&child, &updated), (0, phase), reading.is_some());
                 if let Some(ChildPath { from, begins, course, predicted }) = &path {
@@ -176,10 +178,6 @@ impl<F: Spawns<T, B, N>, T: Real, const B: usize, const N: usize, const L: usize
         children.normalise(recorder)?;
         Ok(reading.map(|_| MixtureResidual::new(&predicted, density, filter.weighing().tempering())))
     }
-}
-
-fn records<T: Real, R: Recorder<T, B>, const B: usize>(_: &R) -> bool {
-    R::RECORDS
 }
 
 impl<F: Spawns<T, B, N>, T: Real, const B: usize, const N: usize, const L: usize, const K: usize> Work<T>

@@ -135,12 +135,12 @@ impl<const B: usize, const N: usize, G: Curve<f32>> SparseEkf<f32, Compact, B, N
         let (first, second, always) = (inputs.at(0), inputs.at(1), inputs.tape.known(true));
         let mut results = Vec::new();
         match piece {
-            Piece::Predict(phase) => drop(self.predict(parts, Course::Known(phase))),
+            Piece::Predict(phase) => drop(self.predict::<_, Compact>(parts, Course::Known(phase))),
             Piece::PredictTurning(phase) => {
                 let turning = Turning { excess: first, variance: second };
-                self.predict(parts, Course::Within(phase, turning));
+                self.predict::<_, Compact>(parts, Course::Within(phase, turning));
             }
-            Piece::PredictOpen => drop(self.predict(parts, Course::Uncertain)),
+            Piece::PredictOpen => drop(self.predict::<_, Compact>(parts, Course::Uncertain)),
             Piece::Take(phase) => {
                 let spread = RateSpread::<_, Compact>::new(parts.rate_variance);
                 let reading = Reading { value: first, extra_variance: second };

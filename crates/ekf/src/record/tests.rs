@@ -117,7 +117,7 @@ fn what_is_written_down_is_what_the_kernel_does() {
         for state in states(&filter) {
             let predicted = |course| {
                 let mut parts = Parts::of(&state);
-                filter.predict(&mut parts, course);
+                filter.predict::<_, Compact>(&mut parts, course);
                 numbers(&parts, &state)
             };
             for phase in Phase::ALL {
@@ -134,8 +134,9 @@ fn what_is_written_down_is_what_the_kernel_does() {
             for phase in Phase::ALL.map(Some).into_iter().chain([None]) {
                 let mut parts = Parts::of(&state);
                 let reading = Reading { value: 0.3, extra_variance: 1e-6 };
-                let spread = RateSpread::new(parts.rate_variance);
-                let taken = filter.update(&mut parts, reading, phase, spread, None).unwrap();
+                let spread = RateSpread::<_, Compact>::new(parts.rate_variance);
+                let (taken, sound) = filter.update(&mut parts, reading, phase, spread, true, |_| true);
+                assert!(sound);
                 let mut expected = numbers(&parts, &state);
                 expected.extend([taken.innovation, taken.variance, taken.nis, 1.0]);
                 compare(&filter, Piece::Take(phase), &state, &[0.3, 1e-6], &expected);
