@@ -8,8 +8,8 @@ as it is. Takes some minutes.
 """
 
 import json
-import math
 import re
+import statistics
 import subprocess
 import sys
 from pathlib import Path
@@ -80,8 +80,8 @@ def main(program, folder):
                 lines[k] = row(line, scored[CASES[max(found, key=len)]])
         file.write_text("\n".join(lines))
     for way, of in ratios.items():
-        mean = math.exp(sum(math.log(ratio) for ratio, _ in of) / len(of))
-        coverage = [share for _, share in of]
+        found, coverage = zip(*of)
+        mean = statistics.geometric_mean(found)
         covered = f"{sum(coverage) / len(coverage):.0f} % ({min(coverage):.0f} % at least)"
         print(f"{way}: {mean:.3f} of the static cubic, geometric mean of {len(of)} halves; intervals cover {covered}")
 

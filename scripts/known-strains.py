@@ -8,7 +8,7 @@ of are left out.
 """
 
 import json
-import math
+import statistics
 import subprocess
 import sys
 from pathlib import Path
@@ -82,7 +82,7 @@ class Cases:
 
 def cell(all_of):
     """Geometric mean of errors and of CRPS, mean coverage and the least."""
-    mean = lambda name: math.exp(sum(math.log(of[name]) for of in all_of) / len(all_of))
+    mean = lambda name: statistics.geometric_mean(of[name] for of in all_of)
     coverage = [100 * of["coverage_95"] for of in all_of]
     covered = f"{sum(coverage) / len(coverage):.0f}; {min(coverage):.0f}"
     return f"{mean('rmse_percent_fs'):.3g}, {mean('crps_percent_fs'):.3g} ({covered})"

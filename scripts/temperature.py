@@ -7,7 +7,7 @@ PROGRAM is the command line. Each sensor is calibrated on the first two thirds o
 """
 
 import json
-import math
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -86,7 +86,7 @@ def main() -> None:
         cells = []
         for part in PARTS:
             errors, covered = zip(*(case[part] for case in cases), strict=True)
-            mean = math.exp(sum(map(math.log, errors)) / len(errors))
+            mean = statistics.geometric_mean(errors)
             cells += [", ".join(f"{error:.1f}" for error in errors), f"{mean:.1f}", ", ".join(f"{share:.0f}" for share in covered)]
         lines.append(f"| {name} | {' | '.join(cells)} |")
     before, rest = PAGE.read_text().split(BEGIN)

@@ -238,7 +238,7 @@ fn a_pause_forgets_the_direction_and_a_smoother_comes_back_through_it() {
     let back = states[..200]
         .iter()
         .rev()
-        .fold(states[200], |next, filtered| split.smooth_back(filtered, &prepared, None, &next).unwrap().unwrap());
+        .fold(states[200], |next, filtered| split.smooth_back(filtered, &prepared, None, &next).unwrap());
     let (back, before) = (back.moments(), known.moments());
     for i in 0..5 {
         let sd = before.covariance[(i, i)].sqrt();

@@ -156,11 +156,11 @@ fn smoothed<E: Estimator<f64, N, L>>(estimator: &E, scenario: &Scenario, start: 
         steps.push(PastStep { from: std::mem::replace(&mut state, advanced.state), prepared, reading });
     }
     let mut states = vec![state.clone()];
-    let smooths = smooth_back_through(estimator, &state, steps.iter().rev(), |state| {
+    smooth_back_through(estimator, &state, steps.iter().rev(), |state| {
         states.push(state.clone());
         true
-    });
-    assert!(smooths.unwrap());
+    })
+    .unwrap();
     states.reverse();
     states
 }

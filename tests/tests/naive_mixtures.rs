@@ -226,7 +226,7 @@ where
         let later: Vec<bool> = shares(&states[k + 1]).iter().map(|share| share.0 > 0.0).collect();
         let smoothed: Vec<_> = of(&next).into_iter().zip(&later).filter_map(|(one, on)| on.then_some(one)).collect();
         let expected = naive.back::<L>(&own[k], (&own[k + 1], &smoothed), SLOW_DT_S);
-        next = filter.smooth_back(&states[k], &prepared, reading(10 * k), &next).unwrap().unwrap();
+        next = filter.smooth_back(&states[k], &prepared, reading(10 * k), &next).unwrap();
         let found: Vec<_> = of(&next).into_iter().zip(&followed).filter_map(|(one, on)| on.then_some(one)).collect();
         assert_eq!(found.len(), expected.len(), "row {k}");
         most = most.max(expected.len());

@@ -207,8 +207,8 @@ fn smoothed_differences<const B: usize, const N: usize, const L: usize>() -> [f6
         .collect();
     let back = |k: usize, later: [&Belief<f64, N, L>; 2]| {
         [
-            sparse.smooth_back(&filtered[k - 1], &sparse, readings[k], later[0]).unwrap().unwrap(),
-            generic.smooth_back(&filtered[k - 1], &prepared, readings[k], later[1]).unwrap().unwrap(),
+            sparse.smooth_back(&filtered[k - 1], &sparse, readings[k], later[0]).unwrap(),
+            generic.smooth_back(&filtered[k - 1], &prepared, readings[k], later[1]).unwrap(),
         ]
     };
     let (mut beside, mut along, mut smoothed) = (0.0_f64, 0.0_f64, [belief; 2]);

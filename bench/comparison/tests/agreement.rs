@@ -113,7 +113,7 @@ fn all_smoothers_agree_on_the_linear_sensor() {
     }
     for k in (1..STEPS).rev() {
         let reading = Some(Reading::from(readings[k]));
-        smoothed[k] = sparse.smooth_back(&smoothed[k], &sparse, reading, &smoothed[k + 1]).unwrap().unwrap();
+        smoothed[k] = sparse.smooth_back(&smoothed[k], &sparse, reading, &smoothed[k + 1]).unwrap();
     }
     for (name, strains) in [
         ("sparse", smoothed[1..].iter().map(|belief| belief.mean[0]).collect::<Vec<_>>()),

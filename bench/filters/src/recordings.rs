@@ -37,7 +37,7 @@ impl Smoother {
         for k in (1..beliefs.len()).rev() {
             let reading = Some(Reading::from(readings[k]));
             let smoothed = self.ekf.smooth_back(&beliefs[k - 1], &self.prepared, reading, &beliefs[k]);
-            beliefs[k - 1] = smoothed.expect("the step went forward").expect("the EKF has a smoother");
+            beliefs[k - 1] = smoothed.expect("the step went forward");
         }
         beliefs
     }

@@ -1,13 +1,14 @@
 //! The correction in files of format 8: the rows that it was learned from, without weights.
 
-use ohmstrain_sensor::{CorrectionParams, CorrectionScale, EstimatorKind, RangeParams, TrainingRow};
+use ohmstrain_ekf::correction::{FEATURES, FILTER_INPUTS, FeatureScale, OUTPUTS};
+use ohmstrain_model::StrainRange;
+use ohmstrain_sensor::{CorrectionParams, EstimatorKind, TrainingRow};
 use serde::Deserialize;
 
 use crate::calibrate::correction_fit::CorrectorInputs;
 use crate::correction::gaussian_process::Settings;
 use crate::correction::simulated::Distilled;
 use crate::correction::{Choices, Chosen, Prepared};
-use ohmstrain_ekf::correction::{FEATURES, FILTER_INPUTS, OUTPUTS};
 use ohmstrain_sensor::correction::{ProcessKind, SIDES, SMOOTHER_INPUTS};
 
 /// Table `correction` of a file of format 8.
@@ -15,7 +16,7 @@ use ohmstrain_sensor::correction::{ProcessKind, SIDES, SMOOTHER_INPUTS};
 #[serde(deny_unknown_fields)]
 pub struct CorrectionOfFormat8 {
     corrects: EstimatorKind,
-    readings: CorrectionScale,
+    readings: FeatureScale<f64>,
     filter: Corrector,
     smoother: Corrector,
     rows: Vec<TrainingRow>,
@@ -44,7 +45,7 @@ struct Process {
 impl CorrectionOfFormat8 {
     /// Learns the weights of the correction; `None` if nothing can be learned from the rows.
     #[must_use]
-    pub fn learned(self, limits: RangeParams) -> Option<CorrectionParams> {
+    pub fn learned(self, limits: StrainRange<f64>) -> Option<CorrectionParams> {
         let Self { corrects, readings, filter, smoother, rows, simulated } = self;
         let inputs = CorrectorInputs::new(&rows);
         let of_filter = Prepared::new(inputs.of_filter(limits));

@@ -1,7 +1,7 @@
 use crate::order::{self, sorted};
 use crate::samples::central_rate;
 use crate::samples::{Samples, filled_strain};
-use ohmstrain_sensor::RangeParams;
+use ohmstrain_model::StrainRange;
 
 /// Statistics of the strain's motion in the recordings.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,7 +68,7 @@ impl MotionStats {
     }
 
     /// Returns the number of strokes: the distance of all movements over this range.
-    pub(crate) fn strokes(&self, range: RangeParams) -> f64 {
+    pub(crate) fn strokes(&self, range: StrainRange<f64>) -> f64 {
         let [stretched, released] = self.distances;
         (stretched + released) / range.span().max(f64::MIN_POSITIVE)
     }

@@ -1,6 +1,6 @@
 use thiserror::Error;
 
-use crate::order::{extent, range};
+use crate::order::{extent, median, range};
 
 /// One recording: times, readings and, where it is known, the true strain.
 ///
@@ -219,9 +219,7 @@ pub(crate) fn filled_strain(samples: &Samples) -> Vec<f64> {
 
 /// Returns the usual time between rows, s: the median step over all recordings.
 pub(crate) fn usual_step_s<'a>(recordings: impl Iterator<Item = &'a [f64]>) -> f64 {
-    let mut steps: Vec<f64> = recordings.flat_map(|time_s| time_s.windows(2).map(|pair| pair[1] - pair[0])).collect();
-    let middle = steps.len() / 2;
-    if steps.is_empty() { 0.0 } else { *steps.select_nth_unstable_by(middle, f64::total_cmp).1 }
+    median(recordings.flat_map(|time_s| time_s.windows(2).map(|pair| pair[1] - pair[0]))).unwrap_or(0.0)
 }
 
 /// Returns the smallest and the largest reading of the rows used for calibration.

@@ -65,7 +65,7 @@ fn fit(made: &Made) -> Result<FusionFit, CalibrationError> {
         truth: made.strain[row],
         strain: made.own[channel][row],
         strain_sd: SD[channel],
-        smoothed: Some(smoothed(made, row, channel)),
+        smoothed: smoothed(made, row, channel),
         static_cubic: 0.0,
     };
     let left_out: Vec<Vec<LeftOutRow>> = (0..CHANNELS).map(|c| (0..ROWS).map(|k| row(c, k)).collect()).collect();

@@ -2,7 +2,8 @@
 
 use ohmstrain_calib::likelihood::Bound;
 use ohmstrain_calib::{GaugeFamily, Identifiability, LawOptions, bootstrap_law, compare_structures, identifiability};
-use ohmstrain_sensor::{BranchParams, GaugeParams, LawParams, RangeParams};
+use ohmstrain_model::{Branch, Gauge, StrainRange};
+use ohmstrain_sensor::LawParams;
 use rand_chacha::ChaCha12Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -12,13 +13,12 @@ use super::bench::Bench;
 const STEP_S: f64 = 0.1;
 
 fn law(tau_s: f64) -> LawParams {
-    let branch =
-        BranchParams { tau_s, extend_gain: 0.5, retract_gain: 0.3, extend_gain_slope: 0.0, retract_gain_slope: 0.0 };
+    let branch = Branch { tau_s, extend_gain: 0.5, retract_gain: 0.3, extend_gain_slope: 0.0, retract_gain_slope: 0.0 };
     LawParams {
         extend_viscosity_s: 0.3,
         retract_viscosity_s: 0.1,
-        range: RangeParams { lower: 0.0, upper: 0.3 },
-        gauge: GaugeParams::Polynomial { coefficients: [1.8, -1.1, 0.0] },
+        range: StrainRange { lower: 0.0, upper: 0.3 },
+        gauge: Gauge::Polynomial { coefficients: [1.8, -1.1, 0.0] },
         branches: vec![branch],
     }
 }
@@ -40,7 +40,7 @@ fn path(legs: &[(f64, f64, f64)]) -> Vec<f64> {
 /// `sd`.
 fn record(law: &LawParams, strain: Vec<f64>, sd: f64, seed: u64) -> Bench {
     let mut rng = ChaCha12Rng::seed_from_u64(seed);
-    let GaugeParams::Polynomial { coefficients: [a, b, _] } = law.gauge else { unreachable!() };
+    let Gauge::Polynomial { coefficients: [a, b, _] } = law.gauge else { unreachable!() };
     let branch = law.branches[0];
     let (mut relaxation, mut noise) = (0.0, 0.0);
     let mut reading = Vec::new();
@@ -193,7 +193,7 @@ fn the_bootstrap_repeats_with_its_seed_and_agrees_with_the_jackknife() {
 #[test]
 fn a_time_constant_on_its_bound_does_not_hold_up_the_other() {
     let mut slow = law(4.0);
-    slow.branches.push(BranchParams { tau_s: 400.0, ..slow.branches[0] });
+    slow.branches.push(Branch { tau_s: 400.0, ..slow.branches[0] });
     // A quarter of the recording is shorter than 400 s, so the second time constant ends on its bound.
     let bench = wandering();
     let from = |tau_s: f64| {

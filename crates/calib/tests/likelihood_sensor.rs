@@ -5,8 +5,10 @@ use ohmstrain_calib::likelihood::{
     Likelihood, LikelihoodProblem, ModelFamily, NoiseFit, NoiseParameter, NoiseStart, Parameter, ReadingSeries,
 };
 use ohmstrain_ekf::{Belief, StepError};
-use ohmstrain_model::{Direction, ModelNoise, Motion, ParameterError, Phase, Scalar, SwitchedModel, Transition};
-use ohmstrain_sensor::{BranchParams, GaugeParams, LawParams, MotionParams, NoiseParams, RangeParams};
+use ohmstrain_model::{
+    Branch, Direction, Gauge, ModelNoise, Motion, ParameterError, Phase, Scalar, StrainRange, SwitchedModel, Transition,
+};
+use ohmstrain_sensor::{LawParams, MotionParams, NoiseParams};
 use rand_chacha::ChaCha12Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -25,9 +27,9 @@ fn law(lean: f64) -> LawParams {
     LawParams {
         extend_viscosity_s: 0.02,
         retract_viscosity_s: 0.02 - lean * 0.02,
-        range: RangeParams { lower: -1.0, upper: 1.5 },
-        gauge: GaugeParams::Polynomial { coefficients: [1.8, 0.0, 0.0] },
-        branches: vec![BranchParams {
+        range: StrainRange { lower: -1.0, upper: 1.5 },
+        gauge: Gauge::Polynomial { coefficients: [1.8, 0.0, 0.0] },
+        branches: vec![Branch {
             tau_s: 4.0,
             extend_gain: 0.6,
             retract_gain: 0.6 - lean * 0.9,

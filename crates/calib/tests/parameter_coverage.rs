@@ -6,7 +6,8 @@
 use std::f64::consts::TAU;
 
 use ohmstrain_calib::{GaugeFamily, LawOptions, Samples, fit_law, identifiability};
-use ohmstrain_sensor::{BranchParams, GaugeParams, LawParams, RangeParams, Uncertainty};
+use ohmstrain_model::{Branch, Gauge, StrainRange};
+use ohmstrain_sensor::{LawParams, Uncertainty};
 use rand_chacha::ChaCha12Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -22,18 +23,13 @@ const MEMORY: f64 = 0.7;
 const NORMAL: f64 = 1.959_964;
 
 fn law() -> LawParams {
-    let branch = BranchParams {
-        tau_s: 6.0,
-        extend_gain: 0.5,
-        retract_gain: -0.3,
-        extend_gain_slope: -0.4,
-        retract_gain_slope: 0.3,
-    };
+    let branch =
+        Branch { tau_s: 6.0, extend_gain: 0.5, retract_gain: -0.3, extend_gain_slope: -0.4, retract_gain_slope: 0.3 };
     LawParams {
         extend_viscosity_s: 0.05,
         retract_viscosity_s: -0.02,
-        range: RangeParams { lower: 0.0, upper: 0.32 },
-        gauge: GaugeParams::Polynomial { coefficients: [1.8, -1.1, 0.4] },
+        range: StrainRange { lower: 0.0, upper: 0.32 },
+        gauge: Gauge::Polynomial { coefficients: [1.8, -1.1, 0.4] },
         branches: vec![branch],
     }
 }
@@ -41,7 +37,7 @@ fn law() -> LawParams {
 /// Returns the true parameters, by the names of the fit.
 fn truth(name: &str) -> f64 {
     let law = law();
-    let GaugeParams::Polynomial { coefficients } = law.gauge else { unreachable!() };
+    let Gauge::Polynomial { coefficients } = law.gauge else { unreachable!() };
     let branch = law.branches[0];
     match name {
         "rest_reading" => REST_OHM,

@@ -4,10 +4,8 @@ use std::fmt::Write;
 
 use crate::common::{Bench, Run};
 use ohmstrain_bench_data::simulate::{Disturbances, Material, Protocol, SimulationSettings, simulate};
-use ohmstrain_model::{Direction, Motion, Phase, SwitchedModel, Transition};
-use ohmstrain_sensor::{
-    BranchParams, EstimatorKind, GaugeParams, LawParams, MotionParams, NoiseParams, RangeParams, SensorParams,
-};
+use ohmstrain_model::{Branch, Direction, Gauge, Motion, Phase, StrainRange, SwitchedModel, Transition};
+use ohmstrain_sensor::{EstimatorKind, LawParams, MotionParams, NoiseParams, SensorParams};
 use rand_chacha::ChaCha12Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -24,14 +22,14 @@ fn linear_law() -> LawParams {
     LawParams {
         extend_viscosity_s: 0.02,
         retract_viscosity_s: 0.02,
-        range: RangeParams { lower: -1.0, upper: 1.5 },
-        gauge: GaugeParams::Polynomial { coefficients: [1.8, 0.0, 0.0] },
+        range: StrainRange { lower: -1.0, upper: 1.5 },
+        gauge: Gauge::Polynomial { coefficients: [1.8, 0.0, 0.0] },
         branches: vec![branch(4.0, [0.6, 0.6], [0.0, 0.0])],
     }
 }
 
-fn branch(tau_s: f64, gains: [f64; 2], slopes: [f64; 2]) -> BranchParams {
-    BranchParams {
+fn branch(tau_s: f64, gains: [f64; 2], slopes: [f64; 2]) -> Branch<f64> {
+    Branch {
         tau_s,
         extend_gain: gains[0],
         retract_gain: gains[1],
@@ -168,8 +166,8 @@ fn matched_law() -> LawParams {
     LawParams {
         extend_viscosity_s: 0.02,
         retract_viscosity_s: -0.02,
-        range: RangeParams { lower: 0.0, upper: 0.6 },
-        gauge: GaugeParams::DecayingExponential { slope: 4.0, decay_strain: 0.21 },
+        range: StrainRange { lower: 0.0, upper: 0.6 },
+        gauge: Gauge::DecayingExponential { slope: 4.0, decay_strain: 0.21 },
         branches: vec![branch(3.5, [0.75, -0.9], [-1.0, -0.3]), branch(45.0, [0.45, -0.35], [-0.9, -0.2])],
     }
 }

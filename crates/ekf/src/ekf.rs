@@ -191,9 +191,9 @@ where
         prepared: &M::Prepared,
         _: Option<Reading<T>>,
         next: &Belief<T, N, L>,
-    ) -> Result<Option<Belief<T, N, L>>, StepError> {
+    ) -> Result<Belief<T, N, L>, StepError> {
         let (transition, prior) = self.predict(filtered, prepared);
-        Ok(Some(rts_step(filtered, &transition, &prior, next)))
+        Ok(rts_step(filtered, &transition, &prior, next))
     }
 }
 

@@ -35,7 +35,7 @@ pub struct Estimate<T> {
 /// The branches of the law predict the fall of a reading within `horizon_s`. Only a `share` of it occurs: laws are fitted to motion
 /// and to drift, and their slow branches absorb more than relaxation. The prediction's error grows with the remaining relaxation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Settling<T> {
     /// Time for which the strain is held, s.

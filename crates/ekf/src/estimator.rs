@@ -56,18 +56,18 @@ pub trait Estimator<T: Scalar, const N: usize, const L: usize> {
     }
 
     /// Smooths one step backwards. Returns the state at time k given all readings, from `filtered` at k, the step from k
-    /// to k+1, and `next`, the smoothed state at k+1. `None` if the estimator has no smoother.
+    /// to k+1, and `next`, the smoothed state at k+1.
     ///
     /// # Errors
-    /// See [`StepError`]; a step that succeeded forward also succeeds backward.
+    /// [`StepError::NoSmoother`] by default. Otherwise a step that succeeded forward also succeeds backward.
     fn smooth_back(
         &self,
         _filtered: &Self::State,
         _prepared: &Self::Prepared,
         _reading: Option<Reading<T>>,
         _next: &Self::State,
-    ) -> Result<Option<Self::State>, StepError> {
-        Ok(None)
+    ) -> Result<Self::State, StepError> {
+        Err(StepError::NoSmoother)
     }
 }
 

@@ -43,8 +43,8 @@ where
         prepared: &Self,
         _: Option<Reading<T>>,
         next: &Belief<T, N, L>,
-    ) -> Result<Option<Belief<T, N, L>>, StepError> {
+    ) -> Result<Belief<T, N, L>, StepError> {
         let (transition, prior) = prepared.transition(filtered);
-        Ok(Some(rts_step(filtered, &transition, &prior, next)))
+        Ok(rts_step(filtered, &transition, &prior, next))
     }
 }

@@ -249,7 +249,7 @@ impl<E> Substeps<E> {
         prepared: &Repeated<E::Prepared, T>,
         reading: Option<Reading<T>>,
         next: &E::State,
-    ) -> Result<Option<E::State>, StepError>
+    ) -> Result<E::State, StepError>
     where
         T: Scalar,
         E: Estimator<T, N, L>,
@@ -262,7 +262,7 @@ impl<E> Substeps<E> {
             let [sooner, later] =
                 [half, prepared.last_count - half].map(|last_count| Repeated { last_count, ..*prepared });
             let middle = self.advance(filtered, &sooner, None)?.state;
-            let Some(between) = self.smooth_back_over(&middle, &later, reading, next)? else { return Ok(None) };
+            let between = self.smooth_back_over(&middle, &later, reading, next)?;
             return self.smooth_back_over(filtered, &sooner, None, &between);
         }
         // The first half forward, the rest backward, then the first half backward, so that few states are held at a
@@ -276,7 +276,7 @@ impl<E> Substeps<E> {
         });
         self.predict_over(&mut middle, lengths)?;
         let later = Repeated { before: rest, count: prepared.count - first, ..*prepared };
-        let Some(later) = self.smooth_back_over(&middle, &later, reading, next)? else { return Ok(None) };
+        let later = self.smooth_back_over(&middle, &later, reading, next)?;
         let sooner = Repeated { count: first - 1, last: self.0.prepare(last_s), last_count: 1, ..*prepared };
         self.smooth_back_over(filtered, &sooner, None, &later)
     }
@@ -329,7 +329,7 @@ where
         prepared: &Self::Prepared,
         reading: Option<Reading<T>>,
         next: &E::State,
-    ) -> Result<Option<E::State>, StepError> {
+    ) -> Result<E::State, StepError> {
         self.smooth_back_over(filtered, prepared, reading, next)
     }
 }

@@ -161,7 +161,7 @@ fn a_smoother_goes_back_through_the_prediction_before_its_cut() {
     let known_rate = Gaussian { mean: 0.12, variance: 1e-14 };
     let next = filter.advance(&filtered, &prepared, None).unwrap().state;
     let next = Mixture::single(knowing_the_rate(&next.shares()[0].belief, &known_rate), Phase::Extend);
-    let back = filter.smooth_back(&filtered, &prepared, None, &next).unwrap().unwrap().moments();
+    let back = filter.smooth_back(&filtered, &prepared, None, &next).unwrap().moments();
 
     let step = Dynamics::<f64, 4, 10>::prepare(&model, 0.2);
     let transition = Dynamics::<f64, 4, 10>::transition(&model, &step, &start, Some(Phase::Extend));

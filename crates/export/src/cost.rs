@@ -6,7 +6,8 @@
 //! from its count.
 
 use ohmstrain_ekf::correction::{BLOCK, FEATURES, OUTPUTS, TIME_CONSTANTS_S};
-use ohmstrain_sensor::{EstimatorKind, GaugeParams, LawParams, PortableCorrection, SensorParams, with_sizes};
+use ohmstrain_model::Gauge;
+use ohmstrain_sensor::{EstimatorKind, LawParams, PortableCorrection, SensorParams, with_sizes};
 use serde::Serialize;
 
 use super::fixed_rate::FixedRate;
@@ -182,7 +183,7 @@ impl Cost {
     fn of_kind(kind: &OfKind, law: &LawParams, chip: &ChipFilter, work: Work) -> Self {
         let ChipFilter { filter, quadratics } = chip;
         let branches = law.branches.len() as f64;
-        let curve = if matches!(law.gauge, GaugeParams::Polynomial { .. }) { 0.0 } else { kind.curve };
+        let curve = if matches!(law.gauge, Gauge::Polynomial { .. }) { 0.0 } else { kind.curve };
         let update = kind.update + kind.update_branch * branches + curve;
         let prediction = kind.prediction + kind.prediction_branch * branches;
         let mut flash = kind.flash + kind.flash_branch * branches;

@@ -4,7 +4,7 @@ use crate::{Gauge, Number, Phase, Scalar};
 /// One relaxing contribution to the resistance: `ċ = -c/τ + (k + κ ε) v`, with separate gains for stretching and
 /// releasing.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Branch<T> {
     /// Time constant τ, s.
@@ -24,7 +24,7 @@ pub struct Branch<T> {
 /// Outside it, the gauge curve continues along its tangent and the gains keep their values at the border: an
 /// extrapolated polynomial is meaningless, and a filter must still be able to return.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct StrainRange<T> {
     /// Lower end.

@@ -144,8 +144,8 @@ impl FusedSensor {
     /// Smooths a whole recording with builders of its sensors, in their order; these may have another R₀, for example.
     ///
     /// # Errors
-    /// If there are more or fewer builders or readings than channels and times, if a channel's estimator has no smoother, or if the fusion
-    /// was not calibrated for smoothers; the row that was refused.
+    /// If there are more or fewer builders or readings than channels and times, or if the fusion was not calibrated for smoothers;
+    /// the row that was refused.
     pub fn smooth_of(
         &self,
         builders: Vec<FilterBuilder>,
@@ -267,7 +267,7 @@ pub struct Fused {
     pub sensor: FusedSensor,
     /// Scores of the fused estimate; `None` if they could not be measured.
     pub scores: Option<Scores>,
-    /// Scores of the fused smoothers; `None` if a channel has no smoother.
+    /// Scores of the fused smoothers.
     pub smoothed: Option<Scores>,
     /// Scores of each channel alone on the same rows.
     pub channels: Vec<Option<Scores>>,

@@ -38,15 +38,10 @@ pub struct QuietWatch {
     range: f64,
     /// 1 if readings grow with the strain, -1 if they fall.
     sign: f64,
-    /// Extreme readings of the run on the side of rest and on the other side, times that sign.
-    ends: (f64, f64),
     /// Smallest strain that is worth a question; `None` if the sensor never reports zero strain.
     worth: Option<f64>,
     pub(crate) known: Vec<Known>,
-    hold: Option<Hold>,
-    asked: usize,
-    /// Reading at the last question, as long as readings stay near it.
-    asked_at: Option<f64>,
+    seen: QuietSeen,
 }
 
 /// Readings that have stayed within a band.
@@ -76,12 +71,14 @@ pub struct Quiet {
 }
 
 /// State of a [`QuietWatch`], to resume from.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct QuietSeen {
+    /// Extreme readings of the run on the side of rest and on the other side, times the sign of [`QuietWatch`].
     ends: (f64, f64),
     hold: Option<Hold>,
     asked: usize,
+    /// Reading at the last question, as long as readings stay near it.
     asked_at: Option<f64>,
 }
 
@@ -99,12 +96,12 @@ impl QuietWatch {
     /// ```
     #[must_use]
     pub const fn seen(&self) -> QuietSeen {
-        QuietSeen { ends: self.ends, hold: self.hold, asked: self.asked, asked_at: self.asked_at }
+        self.seen
     }
 
     /// Resumes from the state of another watch of the same sensor.
     pub fn go_on(&mut self, seen: QuietSeen) {
-        (self.ends, self.hold, self.asked, self.asked_at) = (seen.ends, seen.hold, seen.asked, seen.asked_at);
+        self.seen = seen;
     }
 
     /// Creates a watch. `rest_resistance` is the reading of the rested sensor, if it differs from that in calibration; `known`
@@ -118,17 +115,18 @@ impl QuietWatch {
     /// ```
     #[must_use]
     pub fn new(sensor: &Sensor, rest_resistance: Option<f64>, known: &[Known]) -> Self {
-        let (params, seen) = (sensor.params(), sensor.params().validity);
+        let (params, validity) = (sensor.params(), sensor.params().validity);
         let rested = rest_resistance.unwrap_or_else(|| params.rested());
         let moved = rested / params.rested();
         let span = params.limits.span();
         let can_rest = params.limits.lower <= KNOWN_BEYOND * span && params.limits.upper >= 0.0;
         let worth = can_rest.then_some(WORTH * span);
-        let range = moved * (seen.reading_upper - seen.reading_lower);
+        let range = moved * (validity.reading_upper - validity.reading_lower);
         let strain_at = |reading| params.static_cubic.strain(reading);
-        let sign = if strain_at(seen.reading_upper) > strain_at(seen.reading_lower) { 1.0 } else { -1.0 };
+        let sign = if strain_at(validity.reading_upper) > strain_at(validity.reading_lower) { 1.0 } else { -1.0 };
         let ends = (f64::INFINITY, f64::NEG_INFINITY);
-        Self { rested, range, sign, ends, worth, known: known.to_vec(), hold: None, asked: 0, asked_at: None }
+        let seen = QuietSeen { ends, hold: None, asked: 0, asked_at: None };
+        Self { rested, range, sign, worth, known: known.to_vec(), seen }
     }
 
     /// Takes a row, and returns the question about its hold, once.
@@ -142,25 +140,26 @@ impl QuietWatch {
     /// ```
     pub fn see(&mut self, row: &Estimate) -> Option<Quiet> {
         let (reading, time_s) = (row.resistance.filter(|reading| reading.is_finite())?, row.time_s);
-        self.ends = (self.ends.0.min(self.sign * reading), self.ends.1.max(self.sign * reading));
-        self.asked_at = self.asked_at.filter(|asked_at| (reading - asked_at).abs() <= AWAY * self.range);
-        let hold = self.hold.and_then(|hold| hold.with(time_s, reading, BAND * self.range));
+        let seen = &mut self.seen;
+        seen.ends = (seen.ends.0.min(self.sign * reading), seen.ends.1.max(self.sign * reading));
+        seen.asked_at = seen.asked_at.filter(|asked_at| (reading - asked_at).abs() <= AWAY * self.range);
+        let hold = seen.hold.and_then(|hold| hold.with(time_s, reading, BAND * self.range));
         let new = Hold { from_s: time_s, last_s: time_s, low: reading, high: reading, asked: false };
-        let hold = self.hold.insert(hold.unwrap_or(new));
+        let hold = seen.hold.insert(hold.unwrap_or(new));
         let is_long = time_s - hold.from_s >= QUIET_S && hold.high > hold.low;
         if !is_long || hold.asked {
             return None;
         }
         hold.asked = true;
         let held = 0.5 * (hold.low + hold.high);
-        let (near, (rest_end, other_end)) = (NEAR * self.range, self.ends);
+        let (near, (rest_end, other_end)) = (NEAR * self.range, seen.ends);
         let is_end = other_end - rest_end >= AWAY * self.range && self.sign * held - rest_end <= near;
         let is_near = (held - self.rested).abs() <= near || is_end;
         let is_worth = self.worth.is_some_and(|worth| row.strain.abs() > worth);
         let is_known = self.known.iter().any(|known| (hold.from_s..=time_s).contains(&known.time_s));
-        let asks = is_near && is_worth && !is_known && self.asked < MOST && self.asked_at.is_none();
+        let asks = is_near && is_worth && !is_known && seen.asked < MOST && seen.asked_at.is_none();
         if asks {
-            (self.asked, self.asked_at) = (self.asked + 1, Some(held));
+            (seen.asked, seen.asked_at) = (seen.asked + 1, Some(held));
         }
         asks.then_some(Quiet { from_s: hold.from_s, now_s: time_s, strain: row.strain })
     }

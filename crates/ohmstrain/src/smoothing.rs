@@ -135,13 +135,12 @@ impl FilterBuilder<'_> {
             (time_s, reading.map(|reading| follower.map_or(reading, |follower| follower.relative(reading))))
         };
         let mut back = smoother.way_back(Rows::new(len, &relative)).map_err(failed)?;
-        let (mut outputs, mut estimates, mut first) = (Vec::new(), Vec::new(), len);
+        let (mut outputs, mut estimates) = (Vec::new(), Vec::new());
         let start_s = if len > 0 { row(0).0 } else { 0.0 };
         // Time of the next reading after the row, s.
         let mut next_s = if len > 0 { row(len - 1).0 } else { 0.0 };
         let mut pauses = doubts.map(|doubts| Pauses::new(doubts.unread()));
         while let Some(rows) = back.next_segment(&mut outputs).map_err(failed)? {
-            first = rows.start;
             pauses.iter_mut().for_each(|pauses| pauses.widen(rows.clone(), |k| row(k).0, &mut outputs));
             estimates.clear();
             estimates.extend(rows.clone().zip(&mut outputs).rev().map(|(k, output)| {
@@ -166,6 +165,6 @@ impl FilterBuilder<'_> {
             estimates.reverse();
             take(rows, &estimates)?;
         }
-        if first == 0 { Ok(()) } else { Err(Error::Step(StepError::NoSmoother).into()) }
+        Ok(())
     }
 }

@@ -1,5 +1,5 @@
 use ohmstrain_ekf::live::RestFollower;
-use ohmstrain_sensor::{Quantity, SensorParams, Validity};
+use ohmstrain_sensor::{Quantity, Validity};
 use serde::{Deserialize, Serialize};
 
 use crate::Sensor;
@@ -27,13 +27,9 @@ pub struct ValidityWatch {
     /// Calibrated range of readings, moved to the given R₀; and true if none is given.
     readings: (f64, f64),
     follows: bool,
-    /// Session; `None` if calibration knows one session only, or R₀ is given.
-    session: Option<Session>,
-    start_s: Option<f64>,
-    long: bool,
-    fast: Outside,
-    beyond_readings: Outside,
-    beyond_strains: Outside,
+    /// R₀ of the calibration.
+    rest_reading: f64,
+    seen: ValiditySeen,
 }
 
 /// A use outside the calibrated range; estimates are extrapolations.
@@ -113,26 +109,13 @@ const FOUND_S: f64 = 10.0;
 /// Factor on the longest recording of the calibration above which a run is longer.
 const LONGER: f64 = 1.05;
 
-/// R₀ of a session, if calibration had several sessions.
-#[derive(Clone, Debug)]
-struct Session {
-    follower: RestFollower<f64>,
-    rest_reading: f64,
-}
-
-impl Session {
-    fn new(params: &SensorParams) -> Self {
-        Self { follower: RestFollower::new(params.rest_bounds()), rest_reading: params.rest_reading }
+/// Returns the reading that the sensor would have given with the calibration's R₀, `rest_reading`; NaN if it is missing.
+fn as_calibrated(follower: &mut RestFollower<f64>, rest_reading: f64, reading: f64) -> f64 {
+    let relative = reading / rest_reading - 1.0;
+    if relative.is_finite() {
+        follower.see(0.0, relative);
     }
-
-    /// Returns the reading that the sensor would have given with the calibration's R₀; NaN if it is missing.
-    fn as_calibrated(&mut self, reading: f64) -> f64 {
-        let relative = reading / self.rest_reading - 1.0;
-        if relative.is_finite() {
-            self.follower.see(0.0, relative);
-        }
-        self.rest_reading * (1.0 + self.follower.of_session(relative))
-    }
+    rest_reading * (1.0 + follower.of_session(relative))
 }
 
 impl Outside {
@@ -148,7 +131,7 @@ impl Outside {
 }
 
 /// State of a [`ValidityWatch`], to resume from.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ValiditySeen {
     start_s: Option<f64>,
@@ -156,6 +139,7 @@ pub struct ValiditySeen {
     fast: Outside,
     beyond_readings: Outside,
     beyond_strains: Outside,
+    /// R₀ of the session; `None` if calibration knows one session only, or R₀ is given.
     follower: Option<RestFollower<f64>>,
 }
 
@@ -173,18 +157,13 @@ impl ValidityWatch {
     /// ```
     #[must_use]
     pub fn seen(&self) -> ValiditySeen {
-        let Self { start_s, long, fast, beyond_readings, beyond_strains, .. } = *self;
-        let follower = self.session.as_ref().map(|session| session.follower);
-        ValiditySeen { start_s, long, fast, beyond_readings, beyond_strains, follower }
+        self.seen.clone()
     }
 
     /// Resumes from the state of another watch of the same sensor.
     pub fn go_on(&mut self, seen: ValiditySeen) {
-        (self.start_s, self.long, self.fast) = (seen.start_s, seen.long, seen.fast);
-        (self.beyond_readings, self.beyond_strains) = (seen.beyond_readings, seen.beyond_strains);
-        if let (Some(session), Some(follower)) = (&mut self.session, seen.follower) {
-            session.follower = follower;
-        }
+        let follower = self.seen.follower.map(|own| seen.follower.unwrap_or(own));
+        self.seen = ValiditySeen { follower, ..seen };
     }
 
     /// Creates a watch. `rest_resistance` is the present reading of the rested sensor, if it differs from that in calibration.
@@ -197,20 +176,18 @@ impl ValidityWatch {
     /// ```
     #[must_use]
     pub fn new(sensor: &Sensor, rest_resistance: Option<f64>) -> Self {
-        let (params, seen) = (sensor.params(), &sensor.params().validity);
+        let (params, validity) = (sensor.params(), sensor.params().validity);
         let moved = sensor.rest_reading(rest_resistance) / params.rest_reading;
+        let sessions = params.sessions.filter(|_| rest_resistance.is_none());
+        let follower = sessions.map(|_| RestFollower::new(params.rest_bounds()));
         Self {
-            validity: params.validity,
+            validity,
             quantity: params.quantity,
             reading: reading_column(params.reading),
-            readings: (moved * seen.reading_lower, moved * seen.reading_upper),
+            readings: (moved * validity.reading_lower, moved * validity.reading_upper),
             follows: rest_resistance.is_none(),
-            session: params.sessions.filter(|_| rest_resistance.is_none()).map(|_| Session::new(params)),
-            start_s: None,
-            long: false,
-            fast: Outside::default(),
-            beyond_readings: Outside::default(),
-            beyond_strains: Outside::default(),
+            rest_reading: params.rest_reading,
+            seen: ValiditySeen { follower, ..ValiditySeen::default() },
         }
     }
 
@@ -234,14 +211,15 @@ impl ValidityWatch {
         let Validity { lower, upper, fastest_rate_per_s: fastest_per_s, duration_s: longest_s, drifts, .. } =
             self.validity;
         let (quantity, column, (least, most)) = (self.quantity, self.reading, self.readings);
-        let lasted_s = time_s - *self.start_s.get_or_insert(time_s);
-        let is_long = drifts && !self.long && lasted_s > LONGER * longest_s;
-        self.long |= is_long;
-        let is_fast = lasted_s >= FOUND_S && self.fast.see(rate.abs() > FASTER * fastest_per_s, FAST_BY_CHANCE);
-        let reading = self.session.as_mut().map_or(reading, |session| session.as_calibrated(reading));
-        let is_other = reading.is_finite() && self.beyond_readings.see(!(least..=most).contains(&reading), CHANCE);
-        let is_beyond = truth.is_finite() && self.beyond_strains.see(!(lower..=upper).contains(&truth), CHANCE);
-        let follows = self.follows;
+        let (seen, follows, rest_reading) = (&mut self.seen, self.follows, self.rest_reading);
+        let lasted_s = time_s - *seen.start_s.get_or_insert(time_s);
+        let is_long = drifts && !seen.long && lasted_s > LONGER * longest_s;
+        seen.long |= is_long;
+        let is_fast = lasted_s >= FOUND_S && seen.fast.see(rate.abs() > FASTER * fastest_per_s, FAST_BY_CHANCE);
+        let follower = seen.follower.as_mut();
+        let reading = follower.map_or(reading, |follower| as_calibrated(follower, rest_reading, reading));
+        let is_other = reading.is_finite() && seen.beyond_readings.see(!(least..=most).contains(&reading), CHANCE);
+        let is_beyond = truth.is_finite() && seen.beyond_strains.see(!(lower..=upper).contains(&truth), CHANCE);
         let all = [
             (is_long, Beyond::Duration { longest_s }),
             (is_fast, Beyond::Rate { quantity, fastest_per_s }),

@@ -3,14 +3,14 @@
 use std::collections::BTreeMap;
 
 use ohmstrain::Estimate;
-use ohmstrain_model::SensorLaw;
-use ohmstrain_sensor::{BranchParams, EstimatorParams, SensorParams};
+use ohmstrain_model::{Branch, SensorLaw};
+use ohmstrain_sensor::{EstimatorParams, SensorParams};
 
 /// A sensor's law, with its branches in a slice.
 pub struct Law<'a> {
     /// Gauge curve, dash-pots and range.
     quasi_static: SensorLaw<f64, 0>,
-    branches: &'a [BranchParams],
+    branches: &'a [Branch<f64>],
     estimator: Option<&'a EstimatorParams>,
     rest_reading: f64,
 }
@@ -28,11 +28,11 @@ impl<'a> Law<'a> {
     pub fn new(params: &'a SensorParams, rest_reading: f64) -> Self {
         let law = &params.law;
         let quasi_static = SensorLaw {
-            gauge: law.gauge.to_model(),
+            gauge: law.gauge,
             extend_viscosity_s: law.extend_viscosity_s,
             retract_viscosity_s: law.retract_viscosity_s,
             branches: [],
-            range: law.range.to_model(),
+            range: law.range,
         };
         let estimator = params.estimator(params.filter_of(params.default_estimator)).ok();
         Self { quasi_static, branches: &law.branches, estimator, rest_reading }

@@ -1,6 +1,7 @@
 //! Tables of the report: scores and the sensor's parameters.
 
-use ohmstrain_sensor::{GaugeParams, MotionParams, Quantity, RangeParams, ReadingUnit, SensorParams, Uncertainty};
+use ohmstrain_model::{Gauge, StrainRange};
+use ohmstrain_sensor::{MotionParams, Quantity, ReadingUnit, SensorParams, Uncertainty};
 use serde::Serialize;
 
 use super::{Sample, ScoreRow};
@@ -171,19 +172,19 @@ fn law(params: &SensorParams, rest_reading: f64) -> Table {
     )
 }
 
-fn gauge(rows: &mut ParameterRows, gauge: &GaugeParams, quantity: Quantity) {
+fn gauge(rows: &mut ParameterRows, gauge: &Gauge<f64>, quantity: Quantity) {
     let per = |power| per_quantity(quantity, power);
     match *gauge {
-        GaugeParams::Polynomial { coefficients } => {
+        Gauge::Polynomial { coefficients } => {
             for (i, (name, value)) in ["a₁", "a₂", "a₃"].iter().zip(coefficients).enumerate() {
                 rows.fitted(&format!("Gauge curve {name}"), &format!("gauge.coefficients[{i}]"), value, &per(i + 1));
             }
         }
-        GaugeParams::DecayingExponential { slope, decay_strain } => {
+        Gauge::DecayingExponential { slope, decay_strain } => {
             rows.fitted("Gauge curve: slope at zero G", "gauge.slope", slope, &per(1));
             rows.fitted("Gauge curve: peak ε₀", "gauge.decay_strain", decay_strain, unit(quantity));
         }
-        GaugeParams::Tunnelling { gap, barrier, path_loss } => {
+        Gauge::Tunnelling { gap, barrier, path_loss } => {
             rows.fitted("Gauge curve: growth of the gap C", "gauge.gap", gap, &per(1));
             rows.fitted("Gauge curve: barrier A", "gauge.barrier", barrier, &per(1));
             rows.fitted("Gauge curve: loss of paths W", "gauge.path_loss", path_loss, &per(2));
@@ -214,9 +215,9 @@ fn estimator(params: &SensorParams) -> Option<Table> {
 
 fn ranges(params: &SensorParams) -> Table {
     let (own, rate) = (unit(params.quantity), per_time(params.quantity));
-    let range = |range: RangeParams| format!("{} to {}", plain(range.lower), plain(range.upper));
+    let range = |range: StrainRange<f64>| format!("{} to {}", plain(range.lower), plain(range.upper));
     let validity = &params.validity;
-    let seen = RangeParams { lower: validity.lower, upper: validity.upper };
+    let seen = StrainRange { lower: validity.lower, upper: validity.upper };
     let mut rows = vec![
         ["Limits of the output".into(), range(params.limits), own.into()],
         ["Seen in calibration".into(), range(seen), own.into()],

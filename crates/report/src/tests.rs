@@ -1,22 +1,18 @@
 use std::collections::BTreeMap;
 
 use ohmstrain::{Estimate, Scores};
+use ohmstrain_model::{Branch, Gauge, StrainRange};
 use ohmstrain_sensor::{
-    BranchParams, EstimatorKind, EstimatorParams, GaugeParams, LawParams, MotionParams, NoiseParams, Quantity,
-    RangeParams, ReadingUnit, SensorParams, StaticCubic, Uncertainty, Unstated, Validity,
+    EstimatorKind, EstimatorParams, LawParams, MotionParams, NoiseParams, Quantity, ReadingUnit, SensorParams,
+    StaticCubic, Uncertainty, Unstated, Validity,
 };
 
 use super::{Report, ReportInput, Sample, ScoreRow, Scored};
 
 fn sensor() -> SensorParams {
-    let range = RangeParams { lower: 0.0, upper: 0.3 };
-    let branch = BranchParams {
-        tau_s: 20.0,
-        extend_gain: 0.4,
-        retract_gain: -0.3,
-        extend_gain_slope: 0.0,
-        retract_gain_slope: 0.0,
-    };
+    let range = StrainRange { lower: 0.0, upper: 0.3 };
+    let branch =
+        Branch { tau_s: 20.0, extend_gain: 0.4, retract_gain: -0.3, extend_gain_slope: 0.0, retract_gain_slope: 0.0 };
     let estimator = EstimatorParams {
         phases: None,
         settling: None,
@@ -69,7 +65,7 @@ fn sensor() -> SensorParams {
             extend_viscosity_s: 0.1,
             retract_viscosity_s: -0.1,
             range,
-            gauge: GaugeParams::DecayingExponential { slope: 2.0, decay_strain: 0.2 },
+            gauge: Gauge::DecayingExponential { slope: 2.0, decay_strain: 0.2 },
             branches: vec![branch],
         },
         estimators: BTreeMap::from([(EstimatorKind::Ekf, estimator)]),
@@ -189,7 +185,7 @@ fn anything_gives_a_report() {
     (angle.quantity, angle.reading) = (Quantity::AngleDeg, ReadingUnit::Ratio);
     angle.estimators.clear();
     let mut broken = sensor();
-    broken.law.range = RangeParams { lower: f64::NAN, upper: f64::NAN };
+    broken.law.range = StrainRange { lower: f64::NAN, upper: f64::NAN };
     broken.law.branches[0].tau_s = 0.0;
     for params in [&sensor(), &angle, &broken] {
         page(params, &[], &[], None, &[]);

@@ -12,7 +12,6 @@ use ohmstrain_model::StrainRange;
 
 use crate::params::correction::{CorrectorParams, InputScales, ProcessParams, SimulatedParams};
 pub use crate::params::correction::{SIDES, SMOOTHER_INPUTS, smoother_inputs};
-use crate::params::range::RangeParams;
 
 /// A process of a correction, by the inputs that it sees.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -271,7 +270,7 @@ pub fn standardised<const D: usize>(scales: &[InputScale<f64>; D], row: &[f64; D
 impl<const D: usize, const S: usize> OwnedCorrection<f64, D, S> {
     /// Builds the correction from checked parameters; `inputs` are those of all rows, in order of time.
     #[must_use]
-    pub fn new(params: &CorrectorParams, inputs: &[[f64; D]], limits: RangeParams) -> Self {
+    pub fn new(params: &CorrectorParams, inputs: &[[f64; D]], limits: StrainRange<f64>) -> Self {
         let scales = params.inputs.to_core();
         let one_sided = |side: usize| params.one_sided.get(side).unwrap_or(&params.direct);
         let rows = params.order.iter().filter_map(|row| inputs.get(*row));
@@ -282,7 +281,7 @@ impl<const D: usize, const S: usize> OwnedCorrection<f64, D, S> {
             one_sided: std::array::from_fn(|side| OwnedOneSided::new(one_sided(side))),
             residual: OwnedProcess::new(&params.residual),
             simulated: None,
-            limits: limits.to_model(),
+            limits,
             strain_variance: params.strain_sd.powi(2),
             variance_factor: params.sd_scale.powi(2),
         }

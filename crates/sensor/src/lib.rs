@@ -18,15 +18,11 @@ mod sizes;
 
 pub use error::SensorError;
 pub use params::correction::{
-    CorrectionParams, CorrectionScale, CorrectorParams, FUTURE_FEATURES, InputScales, ProcessParams, SimulatedParams,
-    TrainingRow,
+    CorrectionParams, CorrectorParams, FUTURE_FEATURES, InputScales, ProcessParams, SimulatedParams, TrainingRow,
 };
-pub use params::estimator::{
-    EstimatorKind, EstimatorParams, MotionParams, NoParameters, NoiseParams, PhaseParams, SettlingParams,
-};
+pub use params::estimator::{EstimatorKind, EstimatorParams, MotionParams, NoParameters, NoiseParams, PhaseParams};
 pub use params::findings::{ErrorBudget, ErrorShares, Findings, RecordingSummary, Scores, TENTHS};
-pub use params::law::{BranchParams, GaugeParams, LawParameter, LawParams, MOST_BRANCHES};
-pub use params::range::RangeParams;
+pub use params::law::{LawParameter, LawParams, MOST_BRANCHES};
 pub use params::static_cubic::StaticCubic;
 pub use params::summary::{Limit, Summary, TestedSummary};
 pub use params::temperature::TemperatureParams;

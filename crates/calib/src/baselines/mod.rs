@@ -24,7 +24,8 @@ use crate::CalibrationError;
 use crate::enough::check;
 use crate::order::median;
 use crate::samples::Samples;
-use ohmstrain_sensor::{RangeParams, StaticCubic};
+use ohmstrain_model::StrainRange;
+use ohmstrain_sensor::StaticCubic;
 
 /// Inverse running on one recording.
 pub trait Baseline {
@@ -54,7 +55,7 @@ impl Baselines {
     pub fn fit(recordings: &[Samples]) -> Result<Self, CalibrationError> {
         let (lower, upper) = check(recordings)?;
         Ok(Self {
-            static_cubic: fit_static_cubic(recordings, RangeParams { lower, upper })?,
+            static_cubic: fit_static_cubic(recordings, StrainRange { lower, upper })?,
             fir: Fir::fit(recordings)?,
             low_pass_mode: LowPassMode::fit(recordings)?,
             leaky_bank: LeakyBank::fit(recordings)?,
@@ -65,18 +66,18 @@ impl Baselines {
 /// Last estimate, clipped to a range; kept while there is no new one.
 #[derive(Clone, Copy, Debug)]
 struct Held {
-    range: RangeParams,
+    range: StrainRange<f64>,
     last: f64,
 }
 
 impl Held {
-    fn new(range: RangeParams) -> Self {
+    fn new(range: StrainRange<f64>) -> Self {
         Self { range, last: 0.5 * (range.lower + range.upper) }
     }
 
     fn next(&mut self, strain: Option<f64>) -> f64 {
         if let Some(strain) = strain {
-            self.last = self.range.to_model().clamp(strain);
+            self.last = self.range.clamp(strain);
         }
         self.last
     }

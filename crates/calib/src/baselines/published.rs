@@ -1,13 +1,12 @@
 use std::ops::Range;
 
 use nalgebra::{Matrix2, Vector2};
-use ohmstrain_model::Phase;
+use ohmstrain_model::{Phase, StrainRange};
 
 use super::{Baseline, Held};
 use crate::CalibrationError;
 use crate::enough::check;
 use crate::samples::{Samples, filled_strain};
-use ohmstrain_sensor::RangeParams;
 
 /// Number of time constants tried for each direction.
 const TIME_CONSTANTS: usize = 80;
@@ -30,7 +29,7 @@ pub type PhaseRows = (Phase, Range<usize>);
 pub struct PublishedLaw {
     extend: Movement,
     retract: Movement,
-    range: RangeParams,
+    range: StrainRange<f64>,
 }
 
 /// The law in one direction.
@@ -75,7 +74,7 @@ impl PublishedLaw {
             best_law(&rows).ok_or(CalibrationError::Singular)
         };
         let (extend, retract) = (law(Phase::Extend)?, law(Phase::Retract)?);
-        Ok(Self { extend, retract, range: RangeParams { lower, upper } })
+        Ok(Self { extend, retract, range: StrainRange { lower, upper } })
     }
 
     /// Starts on a recording whose phases begin at these times, s, with the strain of its first row.

@@ -1,4 +1,5 @@
 use nalgebra::DVector;
+use ohmstrain_model::StrainRange;
 
 use super::reading_scale::ReadingScale;
 use super::{Baseline, Held};
@@ -7,7 +8,6 @@ use crate::enough::check;
 use crate::law::blocked_normal::BlockedNormal;
 use crate::law::regression::VALIDATION_BLOCKS;
 use crate::samples::Samples;
-use ohmstrain_sensor::RangeParams;
 
 /// Features of the readings up to now, for a linear regression of strain.
 pub trait Features: Clone {
@@ -27,7 +27,7 @@ pub struct Regression<F> {
     pub cross_validated_rmse: f64,
     scale: ReadingScale,
     weights: DVector<f64>,
-    range: RangeParams,
+    range: StrainRange<f64>,
 }
 
 /// Ridges tried, for regressions with more features than the data need. A larger one would by itself flatten a feature to less than half of
@@ -54,7 +54,7 @@ impl<F: Features> Regression<F> {
                     continue;
                 }
                 if let Some(weights) = normal.fit(&columns, ridge, &[]) {
-                    let (features, range) = (features.clone(), RangeParams { lower, upper });
+                    let (features, range) = (features.clone(), StrainRange { lower, upper });
                     best = Some(Self { features, ridge, cross_validated_rmse, scale, weights, range });
                 }
             }

@@ -1,16 +1,17 @@
 use nalgebra::{DMatrix, DVector};
+use ohmstrain_model::StrainRange;
 
 use super::reading_scale::ReadingScale;
 use super::{Baseline, Held};
 use crate::CalibrationError;
 use crate::samples::Samples;
-use ohmstrain_sensor::{RangeParams, StaticCubic};
+use ohmstrain_sensor::StaticCubic;
 
 /// Fits by least squares over all rows with reading and strain.
 ///
 /// # Errors
 /// If the readings do not vary.
-pub fn fit_static_cubic(recordings: &[Samples], range: RangeParams) -> Result<StaticCubic, CalibrationError> {
+pub fn fit_static_cubic(recordings: &[Samples], range: StrainRange<f64>) -> Result<StaticCubic, CalibrationError> {
     let rows: Vec<(f64, f64)> = recordings
         .iter()
         .flat_map(|samples| samples.complete_rows().map(|k| (samples.reading[k], samples.strain[k])))
@@ -51,7 +52,7 @@ mod tests {
         let strain: Vec<f64> = reading.iter().map(|r| 1e-4 * (r - 1000.0) + 2e-10 * (r - 1000.0_f64).powi(3)).collect();
         let time_s: Vec<f64> = (0..50).map(f64::from).collect();
         let samples = Samples::new(&time_s, &reading, &strain).unwrap();
-        let cubic = fit_static_cubic(&[samples], RangeParams { lower: 0.0, upper: 0.2 }).unwrap();
+        let cubic = fit_static_cubic(&[samples], StrainRange { lower: 0.0, upper: 0.2 }).unwrap();
         for (r, s) in reading.iter().zip(&strain) {
             assert!((cubic.strain(*r) - s.min(0.2)).abs() < 1e-12);
         }

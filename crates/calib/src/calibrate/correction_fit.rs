@@ -1,7 +1,8 @@
 use std::ops::Range;
 
 use ohmstrain_ekf::Reading;
-use ohmstrain_ekf::correction::FILTER_INPUTS;
+use ohmstrain_ekf::correction::{FILTER_INPUTS, FeatureScale};
+use ohmstrain_model::StrainRange;
 
 use crate::CalibrationError;
 use crate::calibrate::correction_scale::{each_row, reading_scale};
@@ -17,9 +18,7 @@ use crate::order::median;
 use crate::prior::{self, CorrectionPrior};
 use crate::samples::{Samples, usual_step_s};
 use ohmstrain_sensor::correction::SMOOTHER_INPUTS;
-use ohmstrain_sensor::{
-    CorrectionParams, CorrectionScale, EstimatorKind, FilterParts, RangeParams, TrainingRow, future_features, outputs,
-};
+use ohmstrain_sensor::{CorrectionParams, EstimatorKind, FilterParts, TrainingRow, future_features, outputs};
 
 /// Pause inserted between recordings, s, so that noise correlated over seconds is not shared between them.
 pub(crate) const PAUSE_S: f64 = 1000.0;
@@ -34,7 +33,7 @@ const ALL_ROWS: usize = 3000;
 pub(crate) fn fit_correction(
     recordings: &[Samples],
     fit: &LawFit,
-    limits: RangeParams,
+    limits: StrainRange<f64>,
     (corrects, recipe): (EstimatorKind, FilterParts<'_>),
     of_make: Option<&CorrectionPrior>,
 ) -> Result<Option<CorrectionParams>, CalibrationError> {
@@ -47,7 +46,7 @@ pub(crate) fn fit_correction(
     let (mut candidates, mut of_recordings) = (Vec::new(), Vec::new());
     let mut start_s = rows.last().map_or(0.0, |row| row.time_s + PAUSE_S);
     for (samples, readings) in recordings.iter().zip(&readings) {
-        let Some(rows) = candidate_rows(samples, readings, &scale, start_s, recipe)? else { return Ok(None) };
+        let rows = candidate_rows(samples, readings, &scale, start_s, recipe)?;
         start_s = rows.last().map_or(start_s, |row: &TrainingRow| row.time_s + PAUSE_S);
         of_recordings.push(candidates.len()..candidates.len() + rows.len());
         candidates.extend(rows);
@@ -69,11 +68,11 @@ fn reference_sd(recordings: &[Samples]) -> f64 {
 }
 
 fn learn(
-    (corrects, readings): (EstimatorKind, CorrectionScale),
+    (corrects, readings): (EstimatorKind, FeatureScale<f64>),
     rows: Vec<TrainingRow>,
     (all, reference_sd): (Option<AllOf>, f64),
     simulated: &[SimulatedRow],
-    limits: RangeParams,
+    limits: StrainRange<f64>,
 ) -> Option<CorrectionParams> {
     let distilled = Distilled::fit(simulated, &rows, limits)?;
     let inputs = CorrectorInputs { few: Columns::new(rows.iter()), all, reference_sd };
@@ -147,13 +146,13 @@ impl CorrectorInputs {
         Self { few: Columns::new(rows.iter()), all: None, reference_sd: 0.0 }
     }
 
-    pub(crate) fn of_filter(&self, limits: RangeParams) -> Examples<'_, FILTER_INPUTS> {
+    pub(crate) fn of_filter(&self, limits: StrainRange<f64>) -> Examples<'_, FILTER_INPUTS> {
         let Columns { filter: inputs, strain, time_s, .. } = &self.few;
         let all = self.all.as_ref().map(|all| all.rows(&all.columns.filter));
         Examples { inputs, strain, time_s, limits, reference_sd: self.reference_sd, all }
     }
 
-    pub(crate) fn of_smoother(&self, limits: RangeParams) -> Examples<'_, SMOOTHER_INPUTS> {
+    pub(crate) fn of_smoother(&self, limits: StrainRange<f64>) -> Examples<'_, SMOOTHER_INPUTS> {
         let Columns { smoother: inputs, strain, time_s, .. } = &self.few;
         let all = self.all.as_ref().map(|all| all.rows(&all.columns.smoother));
         Examples { inputs, strain, time_s, limits, reference_sd: self.reference_sd, all }
@@ -172,15 +171,14 @@ pub(crate) fn rounded(row: &TrainingRow) -> TrainingRow {
     }
 }
 
-/// Returns all rows of a recording with reading and strain, as the calibrated filter and smoother see them; `None` if the estimator has no
-/// smoother.
+/// Returns all rows of a recording with reading and strain, as the calibrated filter and smoother see them.
 fn candidate_rows(
     samples: &Samples,
     readings: &[Option<Reading<f64>>],
-    scale: &CorrectionScale,
+    scale: &FeatureScale<f64>,
     start_s: f64,
     recipe: FilterParts<'_>,
-) -> Result<Option<Vec<TrainingRow>>, CalibrationError> {
+) -> Result<Vec<TrainingRow>, CalibrationError> {
     let failed = |row: usize, source| CalibrationError::Filter { time_s: samples.time_s[row], source };
     let mut filter = recipe.filter(None)?;
     let mut filtered = Vec::with_capacity(readings.len());
@@ -190,9 +188,8 @@ fn candidate_rows(
     }
     let smoothed =
         recipe.smoother(None)?.smooth(samples.time_s, readings).map_err(|(row, error)| failed(row, error))?;
-    let Some(smoothed) = smoothed else { return Ok(None) };
     let mut past = Vec::with_capacity(readings.len());
-    each_row(samples.time_s, readings, scale.past(), |_, _, now| past.push(now));
+    each_row(samples.time_s, readings, *scale, |_, _, now| past.push(now));
     let backwards: (Vec<f64>, Vec<Option<Reading<f64>>>) =
         (samples.time_s.iter().rev().copied().collect(), readings.iter().rev().copied().collect());
     let mut future = Vec::with_capacity(readings.len());
@@ -209,5 +206,5 @@ fn candidate_rows(
             smoothed: outputs(&smoothed[k]),
         })
     };
-    Ok(Some(samples.complete_rows().filter_map(row).collect()))
+    Ok(samples.complete_rows().filter_map(row).collect())
 }

@@ -6,14 +6,16 @@ use ohmstrain_ekf::correction::{FEATURES, FeatureScale, ReadingFeatures, TIME_CO
 use crate::digits::digits;
 use crate::order::extent;
 use crate::samples::Samples;
-use ohmstrain_sensor::CorrectionScale;
 
 /// Number of time constants after which a low-pass has forgotten its start.
 const FORGOTTEN: f64 = 2.0;
 
 /// Returns the range of the readings, the usual size of their rates, and the usual values of their low-passes; `None` if the readings do
 /// not vary.
-pub(crate) fn reading_scale(recordings: &[Samples], readings: &[Vec<Option<Reading<f64>>>]) -> Option<CorrectionScale> {
+pub(crate) fn reading_scale(
+    recordings: &[Samples],
+    readings: &[Vec<Option<Reading<f64>>>],
+) -> Option<FeatureScale<f64>> {
     let known = readings.iter().flatten().flatten().map(|reading| reading.value);
     let (low, high) = extent(known);
     let (centre, half_range) = (digits(0.5 * (low + high)), digits(0.5 * (high - low)));
@@ -31,7 +33,7 @@ pub(crate) fn reading_scale(recordings: &[Samples], readings: &[Vec<Option<Readi
         see_low_passes((samples.time_s, readings), unknown, &mut lines);
     }
     let rates = squares.map(|square: f64| digits((square / f64::max(count, 1.0)).sqrt()).max(f64::MIN_POSITIVE));
-    Some(CorrectionScale { centre, half_range, rates, starts: lines.map(|line| line.fitted().map(digits)) })
+    Some(FeatureScale { centre, half_range, rates, starts: lines.map(|line| line.fitted().map(digits)) })
 }
 
 /// Adds to each line its low-pass once that has forgotten its start; a recording too short for that counts with all its rows.

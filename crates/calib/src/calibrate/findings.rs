@@ -17,15 +17,16 @@ use crate::law::structure::LawFit;
 use crate::motion_stats::MotionStats;
 use crate::prior::CorrectionPrior;
 use crate::samples::Samples;
+use ohmstrain_model::StrainRange;
 use ohmstrain_sensor::fusion::Member;
 use ohmstrain_sensor::{
-    EstimatorKind, EstimatorParams, FilterParts, Findings, Learned, NoParameters, RangeParams, RecordingSummary,
-    SensorError, TENTHS, Unstated,
+    EstimatorKind, EstimatorParams, FilterParts, Findings, Learned, NoParameters, RecordingSummary, SensorError,
+    TENTHS, Unstated,
 };
 use rayon::prelude::*;
 
 /// Summarises the recordings of a calibration.
-pub(crate) fn seen(recordings: &[Samples], range: RangeParams, stats: &MotionStats) -> RecordingSummary {
+pub(crate) fn seen(recordings: &[Samples], range: StrainRange<f64>, stats: &MotionStats) -> RecordingSummary {
     let mut counts = [0_usize; TENTHS];
     for samples in recordings {
         for k in samples.complete_rows() {
@@ -73,8 +74,8 @@ pub struct LeftOutRow {
     pub strain: f64,
     /// Its standard deviation, including the unstated error estimated on the other quarters.
     pub strain_sd: f64,
-    /// The smoother's strain with its standard deviation, which includes its unstated error; `None` if the estimator has no smoother.
-    pub smoothed: Option<Member>,
+    /// The smoother's strain with its standard deviation, which includes its unstated error.
+    pub smoothed: Member,
     /// The static cubic's strain.
     pub static_cubic: f64,
 }
@@ -106,7 +107,7 @@ impl Scored {
     fn widen(&mut self, unstated: Unstated) {
         for row in &mut self.rows {
             row.strain_sd = row.strain_sd.hypot(unstated.filter_sd);
-            row.smoothed.iter_mut().for_each(|member| member.sd = member.sd.hypot(unstated.smoother_sd));
+            row.smoothed.sd = row.smoothed.sd.hypot(unstated.smoother_sd);
         }
         self.filter.iter_mut().for_each(|row| *row = row.with_unstated(unstated.filter_sd));
         self.smoother.iter_mut().for_each(|row| *row = row.with_unstated(unstated.smoother_sd));
@@ -209,14 +210,14 @@ impl Check<'_> {
                 let row = |strain: f64, sd: Option<f64>| ScoredRow { time_s, truth, strain, sd };
                 let estimate = filter.output().estimate;
                 let (strain, strain_sd) = (estimate.strain.mean, estimate.strain.sd());
-                let smoothed = smoothed.as_ref().map(|rows| rows[k].estimate.strain);
-                let smoothed = smoothed.map(|strain| Member { strain: strain.mean, sd: strain.sd() });
+                let smoothed = smoothed[k].estimate.strain;
+                let smoothed = Member { strain: smoothed.mean, sd: smoothed.sd() };
                 let left_out =
                     LeftOutRow { recording: r, row: k, truth, strain, strain_sd, smoothed, static_cubic: on_cubic };
                 of_recording.rows.push(left_out);
                 of_recording.filter.push(row(strain, Some(strain_sd)));
                 of_recording.directions.push((directions[r][k], estimate.rate.mean, strain - truth));
-                of_recording.smoother.extend(smoothed.map(|member| row(member.strain, Some(member.sd))));
+                of_recording.smoother.push(row(smoothed.strain, Some(smoothed.sd)));
                 of_recording.static_cubic.push(row(on_cubic, None));
             }
             scored.append(of_recording);

@@ -1,11 +1,12 @@
 use std::ops::Range;
 
 use ohmstrain_ekf::{Gaussian, Reading};
+use ohmstrain_model::StrainRange;
 use rayon::prelude::*;
 
 use crate::law::fit::CrossFit;
 use crate::samples::Samples;
-use ohmstrain_sensor::{FilterParts, LawParams, RangeParams};
+use ohmstrain_sensor::{FilterParts, LawParams};
 
 /// Standard deviation assumed for every reference, as a fraction of the strain's range; greater precision does not improve the score.
 pub(crate) const REFERENCE_SD: f64 = 0.005;
@@ -15,7 +16,7 @@ pub(crate) const REFERENCE_SD: f64 = 0.005;
 /// Residuals of a law that has seen the block are too small. A filter tuned on them would trust its law more than is justified elsewhere.
 pub(crate) struct LeftOut<'a> {
     runs: Vec<Run<'a>>,
-    limits: RangeParams,
+    limits: StrainRange<f64>,
 }
 
 /// Function that builds the parts of a filter for a law fitted without a block.
@@ -75,7 +76,7 @@ impl Run<'_> {
 
 impl<'a> LeftOut<'a> {
     /// Takes every `stride`-th row. The model is continuous in time, so the same parameters fit any sampling.
-    pub(crate) fn new(samples: &[Samples], fit: &'a CrossFit, limits: RangeParams, stride: usize) -> Self {
+    pub(crate) fn new(samples: &[Samples], fit: &'a CrossFit, limits: StrainRange<f64>, stride: usize) -> Self {
         let mut runs = Vec::new();
         for (block, law) in fit.without_block.iter().enumerate() {
             for (recording, samples) in samples.iter().enumerate() {
@@ -115,11 +116,11 @@ impl<'a> LeftOut<'a> {
         self.of_rows(build, |strain, truth| truth.deviation(strain))
     }
 
-    /// Returns the same for the smoother of whole recordings; `None` if the estimator has none.
+    /// Returns the same for the smoother of whole recordings.
     pub(crate) fn smoothed_deviations(&self, build: &Build) -> Option<Vec<Vec<f64>>> {
         let of_run = |run: &Run| {
             let mut smoother = build(run.fold).smoother(None).ok()?;
-            let smoothed = smoother.smooth(&run.time_s, &run.reading).ok()??;
+            let smoothed = smoother.smooth(&run.time_s, &run.reading).ok()?;
             let known = run.block.clone().filter(|&k| run.strain[k].is_finite());
             Some(known.map(|k| run.truth(k).deviation(smoothed[k].estimate.strain)).collect())
         };

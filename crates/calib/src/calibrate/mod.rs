@@ -38,9 +38,10 @@ use crate::recording::screen::{Distrusted, screen};
 use crate::recording::sessions::sessions;
 use crate::recording::turns::longest_unturned_s;
 use crate::samples::{Samples, reading_range};
+use ohmstrain_model::StrainRange;
 use ohmstrain_sensor::{
-    CorrectionParams, EstimatorKind, EstimatorParams, FORMAT, FilterParts, Findings, LawParams, Quantity, RangeParams,
-    ReadingUnit, SensorParams, Sessions, StaticCubic, Summary, Uncertainty, Unstated, Validity,
+    CorrectionParams, EstimatorKind, EstimatorParams, FORMAT, FilterParts, Findings, LawParams, Quantity, ReadingUnit,
+    SensorParams, Sessions, StaticCubic, Summary, Uncertainty, Unstated, Validity,
 };
 
 /// Stage of a calibration, for a progress bar.
@@ -80,7 +81,7 @@ pub struct Calibration {
     /// Learned correction of the filter, if one was asked for.
     pub correction: Option<CorrectionParams>,
     /// The range of the reference.
-    pub limits: RangeParams,
+    pub limits: StrainRange<f64>,
     /// Calibrated range.
     pub validity: Validity,
     /// Differences between recordings; `None` unless several begin at rest.
@@ -280,7 +281,7 @@ fn cheapest<'s, 'a: 's>(surveyed: impl Iterator<Item = &'s Surveyed<'a>>) -> Opt
 
 /// Returns the calibrated ranges. Readings are relative to the R₀ of their recording; in ohms, the spread between sessions would hide how
 /// far a strain moves the reading.
-fn validity(recordings: &[Samples], fit: &LawFit, limits: RangeParams, stats: &MotionStats) -> Validity {
+fn validity(recordings: &[Samples], fit: &LawFit, limits: StrainRange<f64>, stats: &MotionStats) -> Validity {
     let rest_readings = &fit.rest_readings;
     let rest = median_rest(rest_readings);
     let of_sensor = |of: f64, samples: &Samples| {

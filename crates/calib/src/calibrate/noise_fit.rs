@@ -1,4 +1,6 @@
+use ohmstrain_ekf::Settling;
 use ohmstrain_ekf::live::news;
+use ohmstrain_model::StrainRange;
 
 use crate::CalibrationError;
 use crate::calibrate::left_out::{Fold, LeftOut};
@@ -9,9 +11,7 @@ use crate::optimise::{Ends, nelder_mead};
 use crate::prior::EstimatorPrior;
 use crate::samples::{Samples, usual_step_s};
 use crate::sd_scale::sd_scale;
-use ohmstrain_sensor::{
-    EstimatorKind, EstimatorParams, FilterParts, MotionParams, NoiseParams, PhaseParams, RangeParams, SettlingParams,
-};
+use ohmstrain_sensor::{EstimatorKind, EstimatorParams, FilterParts, MotionParams, NoiseParams, PhaseParams};
 
 /// Pull toward the starting values, per squared step of a log-parameter; keeps the score of a single recording from running away.
 const REGULARISATION: f64 = 1e-2;
@@ -107,7 +107,7 @@ pub(crate) struct Tuned {
 pub(crate) struct NoiseProblem<'a> {
     samples: &'a [Samples<'a>],
     fit: &'a CrossFit,
-    limits: RangeParams,
+    limits: StrainRange<f64>,
     stats: MotionStats,
     kind: EstimatorKind,
     /// Prior from other sensors of the make.
@@ -220,7 +220,7 @@ impl<'a> NoiseProblem<'a> {
     }
 
     /// Returns the settling of the filter in the holds of held-out blocks.
-    fn settling(&self, left_out: &LeftOut, params: EstimatorParams) -> Option<SettlingParams> {
+    fn settling(&self, left_out: &LeftOut, params: EstimatorParams) -> Option<Settling<f64>> {
         let holds = LongHolds::new(self.samples, self.limits.span())?;
         let params = EstimatorParams { settling: Some(holds.law()), ..params };
         holds.settling(left_out, &|fold| self.recipe(self.kind, fold, params))

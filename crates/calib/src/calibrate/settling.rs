@@ -1,5 +1,6 @@
 //! Fall of the readings in the holds of a calibration, against the law's prediction.
 
+use ohmstrain_ekf::Settling;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::calibrate::left_out::{Build, LeftOut, PredictedFall};
@@ -7,7 +8,6 @@ use crate::order;
 use crate::recording::holds::{Hold, LEAST_HOLD_S, holds};
 use crate::samples::Samples;
 use crate::sd_scale::Z_95;
-use ohmstrain_sensor::SettlingParams;
 
 /// Minimum duration of a hold, as a fraction of the longest. Shorter ones end before the others.
 const LEAST_SHARE: f64 = 1.0 / 3.0;
@@ -58,15 +58,15 @@ impl LongHolds {
     }
 
     /// Returns the settling of filters that report the full relaxation of the branches within the longest hold.
-    pub(crate) const fn law(&self) -> SettlingParams {
-        SettlingParams { horizon_s: self.longest_s, share: 1.0, share_sd: 0.0, sd: 0.0 }
+    pub(crate) const fn law(&self) -> Settling<f64> {
+        Settling { horizon_s: self.longest_s, share: 1.0, share_sd: 0.0, sd: 0.0 }
     }
 
     /// Estimates the settling; `None` if a filter fails. `build` makes filters with [`Self::law`].
     ///
     /// The share is the least-squares estimate, the standard deviations are maximum-likelihood estimates. Errors within one hold are alike,
     /// so the number of holds determines the uncertainty for another hold, by Student's t.
-    pub(crate) fn settling(&self, left_out: &LeftOut, build: &Build) -> Option<SettlingParams> {
+    pub(crate) fn settling(&self, left_out: &LeftOut, build: &Build) -> Option<Settling<f64>> {
         let fall = |of: PredictedFall| {
             let place = self.rows[of.recording].binary_search(&of.row).ok()?;
             Some(Fall { read: self.read[of.recording][place] / of.rest_reading, predicted: of.predicted })
@@ -89,7 +89,7 @@ fn rows_of(hold: &Hold, samples: &Samples) -> Vec<(usize, f64)> {
 }
 
 /// Estimates share and standard deviations from the rows of `count` holds.
-fn likeliest(falls: &[Fall], count: usize, horizon_s: f64) -> SettlingParams {
+fn likeliest(falls: &[Fall], count: usize, horizon_s: f64) -> Settling<f64> {
     let squares: f64 = falls.iter().map(|fall| fall.predicted * fall.predicted).sum();
     let products: f64 = falls.iter().map(|fall| fall.read * fall.predicted).sum();
     let share = (products / squares.max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
@@ -106,7 +106,7 @@ fn likeliest(falls: &[Fall], count: usize, horizon_s: f64) -> SettlingParams {
     let grid = (0..=steps).map(|k| least * (most / least).powf(f64::from(k) / f64::from(steps)));
     let ratio = std::iter::once(0.0).chain(grid).min_by(|a, b| cost(a).total_cmp(&cost(b))).unwrap_or(0.0);
     let sd = constant(ratio).sqrt() * widened(count);
-    SettlingParams { horizon_s, share, share_sd: ratio * sd / usual, sd }
+    Settling { horizon_s, share, share_sd: ratio * sd / usual, sd }
 }
 
 /// Returns the factor on an interval whose standard deviation was estimated from `count` holds.

@@ -3,6 +3,8 @@
 use std::f64::consts::{PI, TAU};
 
 use ohmstrain_ekf::Reading;
+use ohmstrain_ekf::correction::FeatureScale;
+use ohmstrain_model::StrainRange;
 use rand_chacha::ChaCha12Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal, Uniform};
@@ -11,7 +13,6 @@ use crate::calibrate::correction_scale::each_row;
 use crate::correction::simulated::SimulatedRow;
 use crate::law::structure::LawFit;
 use crate::motion_stats::MotionStats;
-use ohmstrain_sensor::{CorrectionScale, RangeParams};
 
 /// Number of simulated motions, their duration, s, and the start of each that is dropped while low-passes forget it, s.
 const MOTIONS: usize = 24;
@@ -45,7 +46,7 @@ type Speeds = (f64, f64);
 pub(crate) fn simulated_rows(
     fit: &LawFit,
     stats: &MotionStats,
-    scale: &CorrectionScale,
+    scale: &FeatureScale<f64>,
     step_s: f64,
 ) -> Vec<SimulatedRow> {
     let step_s = step_s.max(LEAST_STEP_S);
@@ -60,7 +61,7 @@ pub(crate) fn simulated_rows(
     for _ in 0..MOTIONS {
         let strain = motion(&mut rng, rows, step_s, fit.law.range, speeds);
         let readings = readings(fit, &strain, step_s, &mut rng);
-        each_row(&time_s, &readings, scale.past(), |k, _, past| {
+        each_row(&time_s, &readings, *scale, |k, _, past| {
             if k >= forgotten && (k - forgotten).is_multiple_of(every) {
                 found.extend(past.map(|past| SimulatedRow { past, strain: strain[k] }));
             }
@@ -70,7 +71,7 @@ pub(crate) fn simulated_rows(
 }
 
 /// Draws a motion. Half of its pieces are ramps, to anywhere or to an end of the range; the others are holds, and sines around any strain.
-fn motion(rng: &mut ChaCha12Rng, rows: usize, step_s: f64, range: RangeParams, speeds: Speeds) -> Vec<f64> {
+fn motion(rng: &mut ChaCha12Rng, rows: usize, step_s: f64, range: StrainRange<f64>, speeds: Speeds) -> Vec<f64> {
     let mut uniform = |from: f64, to: f64| Uniform::new_inclusive(from, to).map_or(from, |any| any.sample(rng));
     let (low, high) = (range.lower, range.upper);
     let mut strain = vec![uniform(low, high)];
@@ -116,7 +117,7 @@ fn ramp(from: f64, to: f64, step: f64) -> impl Iterator<Item = f64> {
 /// changes linearly between rows.
 fn readings(fit: &LawFit, strain: &[f64], step_s: f64, rng: &mut ChaCha12Rng) -> Vec<Option<Reading<f64>>> {
     let law = &fit.law;
-    let gauge = law.gauge.to_model();
+    let gauge = law.gauge;
     let mut normal = || -> f64 { StandardNormal.sample(rng) };
     let rest = (REST_SPREAD * normal()).exp();
     let kept = (-step_s / ERROR_TIME_S).exp();
@@ -146,11 +147,12 @@ fn readings(fit: &LawFit, strain: &[f64], step_s: f64, rng: &mut ChaCha12Rng) ->
 
 #[cfg(test)]
 mod tests {
-    use ohmstrain_sensor::{BranchParams, GaugeParams, LawParams};
+    use ohmstrain_model::{Branch, Gauge};
+    use ohmstrain_sensor::LawParams;
 
     use super::*;
 
-    const RANGE: RangeParams = RangeParams { lower: 0.05, upper: 0.35 };
+    const RANGE: StrainRange<f64> = StrainRange { lower: 0.05, upper: 0.35 };
 
     #[test]
     fn motions_hold_and_move_within_range_and_speeds() {
@@ -180,17 +182,17 @@ mod tests {
     /// Compares a law without error with its differential equations, integrated in a thousand steps a row.
     #[test]
     fn readings_are_the_laws() {
-        let branch = BranchParams {
+        let branch = Branch {
             tau_s: 2.0,
             extend_gain: 0.9,
             retract_gain: -0.6,
             extend_gain_slope: 0.4,
             retract_gain_slope: -0.7,
         };
-        let slow = BranchParams { tau_s: 30.0, extend_gain: 0.3, ..branch };
+        let slow = Branch { tau_s: 30.0, extend_gain: 0.3, ..branch };
         let law = LawParams {
             range: RANGE,
-            gauge: GaugeParams::Polynomial { coefficients: [2.0, -1.0, 3.0] },
+            gauge: Gauge::Polynomial { coefficients: [2.0, -1.0, 3.0] },
             extend_viscosity_s: 0.05,
             retract_viscosity_s: -0.02,
             branches: vec![branch, slow],

@@ -4,6 +4,7 @@ use ohmstrain_sensor::Unstated;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::calibrate::scores::ScoredRow;
+use crate::order::sorted;
 use crate::sd_scale::Z_95;
 
 /// Share of the rows that an interval should cover.
@@ -31,8 +32,7 @@ fn unstated_sd(rows: &[ScoredRow], times: f64) -> f64 {
         let needed = times * (row.strain - row.truth) / Z_95;
         row.sd.map(|sd| needed * needed - sd * sd).filter(|lacks| lacks.is_finite())
     };
-    let mut lacking: Vec<f64> = rows.iter().filter_map(lacks).collect();
-    lacking.sort_unstable_by(f64::total_cmp);
+    let lacking = sorted(rows.iter().filter_map(lacks));
     let held = (LEVEL * lacking.len() as f64).ceil() as usize;
     let variance = held.checked_sub(1).and_then(|last| lacking.get(last)).copied().unwrap_or(0.0);
     variance.max(0.0).sqrt()

@@ -5,8 +5,9 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 use ohmstrain_ekf::Gaussian;
 use ohmstrain_ekf::correction::{FEATURES, FILTER_INPUTS, OUTPUTS, filter_inputs, kernel};
+use ohmstrain_model::StrainRange;
 use ohmstrain_sensor::correction::{relevance, standardised};
-use ohmstrain_sensor::{RangeParams, SimulatedParams, TrainingRow};
+use ohmstrain_sensor::{SimulatedParams, TrainingRow};
 use serde::Deserialize;
 
 use super::prepared::{Prepared, scale};
@@ -45,7 +46,7 @@ pub(crate) struct Distilled {
 
 impl Distilled {
     /// Learns from simulated rows; `real` rows determine the scales of the inputs. `None` if equations are singular.
-    pub(crate) fn fit(simulated: &[SimulatedRow], real: &[TrainingRow], limits: RangeParams) -> Option<Self> {
+    pub(crate) fn fit(simulated: &[SimulatedRow], real: &[TrainingRow], limits: StrainRange<f64>) -> Option<Self> {
         let scales: [_; FEATURES] = std::array::from_fn(|i| scale(real.iter().map(|row| row.past[i])));
         let on_scale = |row: &SimulatedRow| -> [f64; FEATURES] {
             std::array::from_fn(|i| (row.past[i] - scales[i].mean) / scales[i].sd)
@@ -62,7 +63,7 @@ impl Distilled {
     }
 }
 
-fn centre(limits: RangeParams) -> f64 {
+fn centre(limits: StrainRange<f64>) -> f64 {
     0.5 * (limits.lower + limits.upper)
 }
 
@@ -160,7 +161,7 @@ mod tests {
         (inputs, strain)
     }
     const D: usize = FILTER_INPUTS;
-    const LIMITS: RangeParams = RangeParams { lower: -2.0, upper: 2.0 };
+    const LIMITS: StrainRange<f64> = StrainRange { lower: -2.0, upper: 2.0 };
 
     /// Tests that sixty-four rows represent four thousand, with the stated error: two features of seven within ±1.7, in a kernel four wide.
     /// An error in one block of the calibration's rows widens the stated error for all.

@@ -1,15 +1,15 @@
 use nalgebra::{DMatrix, DVector};
 use ohmstrain_ekf::Gaussian;
+use ohmstrain_model::StrainRange;
 
 use super::criterion::Criterion;
 use super::prepared::{Choosing, scale};
 use super::{AllRows, Choices, Chosen, Examples, Prepared};
 use crate::correction::gaussian_process::{GaussianProcess, Settings, TrainingSet};
-use ohmstrain_sensor::RangeParams;
 use ohmstrain_sensor::correction::{OwnedCorrection, ProcessKind};
 
 const D: usize = 8;
-const LIMITS: RangeParams = RangeParams { lower: -10.0, upper: 10.0 };
+const LIMITS: StrainRange<f64> = StrainRange { lower: -10.0, upper: 10.0 };
 
 /// Returns rows on wandering curves, no two of which agree in their inputs, with a filter whose error is smooth.
 fn examples<const D: usize>(n: usize, dt_s: f64) -> (Vec<[f64; D]>, Vec<f64>, Vec<f64>) {

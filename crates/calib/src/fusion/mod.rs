@@ -7,8 +7,9 @@ mod regressions;
 
 use std::collections::HashMap;
 
+use ohmstrain_model::StrainRange;
 use ohmstrain_sensor::fusion::{FUSION_FORMAT, FusionErrors, FusionParams, Member};
-use ohmstrain_sensor::{Quantity, RangeParams, Scores};
+use ohmstrain_sensor::{Quantity, Scores};
 
 use crate::CalibrationError;
 use crate::calibrate::findings::LeftOutRow;
@@ -49,7 +50,7 @@ pub struct FusionFit {
     pub params: FusionParams,
     /// Scores of the fused estimate; `None` if the channels have no estimates of held-out parts.
     pub fused: Option<Scores>,
-    /// Scores of the fused smoothers; `None` if a channel has no smoother.
+    /// Scores of the fused smoothers.
     pub smoothed: Option<Scores>,
     /// Scores of each channel alone on the same rows.
     pub channels: Vec<Option<Scores>>,
@@ -85,7 +86,7 @@ pub fn fit_fusion(
         rows: readings.thinned(|_| true, KEPT_ROWS).map(|row| row.seen.clone()).collect(),
     };
     let judged_by = |own| judged(channels, &readings, &left_out, own);
-    let filtered = judged_by(|row| Some(Member { strain: row.strain, sd: row.strain_sd }));
+    let filtered = judged_by(|row| Member { strain: row.strain, sd: row.strain_sd });
     if filtered.is_empty() {
         return Ok(FusionFit { params, fused: None, smoothed: None, channels: vec![None; channels.len()] });
     }
@@ -94,14 +95,14 @@ pub fn fit_fusion(
     let helps = check.log_loss(&all, &filtered) <= check.log_loss(&filters, &filtered);
     let errors = if helps { all } else { filters.clone() };
     let smoothed = judged_by(|row| row.smoothed);
-    let smoothers = Some(check.errors(&smoothed, errors.covariance.len())).filter(|_| !smoothed.is_empty());
+    let smoothers = check.errors(&smoothed, errors.covariance.len());
     let fused = score(&filtered, &check.fused(&errors, &filtered));
-    let smoothed_score = smoothers.as_ref().and_then(|errors| score(&smoothed, &check.fused(errors, &smoothed)));
+    let smoothed_score = score(&smoothed, &check.fused(&smoothers, &smoothed));
     let of_channel =
         |channel| score(&filtered, &filtered.iter().map(|one| Some(one.members[channel])).collect::<Vec<_>>());
     let alone = (0..channels.len()).map(of_channel).collect();
     let regressions = if helps { params.regressions } else { Vec::new() };
-    let params = FusionParams { errors, filters: Some(filters), smoothers, regressions, ..params };
+    let params = FusionParams { errors, filters: Some(filters), smoothers: Some(smoothers), regressions, ..params };
     Ok(FusionFit { params, fused, smoothed: smoothed_score, channels: alone })
 }
 
@@ -143,10 +144,10 @@ impl Check<'_> {
 }
 
 /// Returns the range of the strain.
-fn limits(recordings: &[Samples]) -> Result<RangeParams, CalibrationError> {
+fn limits(recordings: &[Samples]) -> Result<StrainRange<f64>, CalibrationError> {
     let strains = recordings.iter().flat_map(|samples| samples.strain).copied().filter(|strain| strain.is_finite());
     let (lower, upper) = extent(strains);
-    if lower < upper { Ok(RangeParams { lower, upper }) } else { Err(CalibrationError::NoCommonRows) }
+    if lower < upper { Ok(StrainRange { lower, upper }) } else { Err(CalibrationError::NoCommonRows) }
 }
 
 /// Returns low-pass time constants for the motion of these recordings, s.
@@ -167,11 +168,10 @@ fn judged<'a>(
     channels: &[FusionChannel],
     readings: &'a Readings,
     regressions: &[Vec<Member>],
-    own: fn(&LeftOutRow) -> Option<Member>,
+    own: fn(&LeftOutRow) -> Member,
 ) -> Vec<Judged<'a>> {
     let by_row = |channel: &FusionChannel| -> HashMap<(usize, usize), Member> {
-        let of_row = |one: &LeftOutRow| Some(((one.recording, one.row), own(one)?));
-        channel.left_out.iter().filter_map(of_row).collect()
+        channel.left_out.iter().map(|one| ((one.recording, one.row), own(one))).collect()
     };
     let own: Vec<HashMap<(usize, usize), Member>> = channels.iter().map(by_row).collect();
     let of_row = |row: &'a ReadingsRow| {

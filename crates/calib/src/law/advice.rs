@@ -2,10 +2,11 @@
 //! stroke over the whole range, so that they apply to strains and angles alike.
 
 use nalgebra::{Cholesky, DMatrix};
+use ohmstrain_model::StrainRange;
 
 use crate::likelihood::Bound;
 use crate::motion_stats::MotionStats;
-use ohmstrain_sensor::{RangeParams, Uncertainty};
+use ohmstrain_sensor::Uncertainty;
 
 /// Standard error of a time constant, relative to its value, above which it is not identified. A 95 % interval from half to twice the value
 /// corresponds to about 0.35.
@@ -39,7 +40,7 @@ pub(crate) fn advice(
     parameters: &Uncertainty,
     on_bound: &[OnBound],
     stats: &MotionStats,
-    range: RangeParams,
+    range: StrainRange<f64>,
     jacobian: &DMatrix<f64>,
 ) -> Vec<String> {
     let stroke_s = range.span() / stats.speed.max(f64::MIN_POSITIVE);
@@ -68,7 +69,7 @@ fn both_directions(stats: &MotionStats, stroke_s: f64) -> Option<String> {
 }
 
 /// Advises more strokes if a block that is left out to test a law would not contain a motion.
-fn enough_strokes(stats: &MotionStats, range: RangeParams, stroke_s: f64) -> Option<String> {
+fn enough_strokes(stats: &MotionStats, range: StrainRange<f64>, stroke_s: f64) -> Option<String> {
     if stats.strokes(range) < FEWEST_STROKES {
         let [stroke, all] = [stroke_s, 2.0 * FEWEST_STROKES * stroke_s].map(duration);
         let times = 2.0 * FEWEST_STROKES;
@@ -83,7 +84,7 @@ fn enough_strokes(stats: &MotionStats, range: RangeParams, stroke_s: f64) -> Opt
 }
 
 /// Advises rest near zero strain if R₀ would otherwise be an extrapolation.
-fn near_zero(range: RangeParams) -> Option<String> {
+fn near_zero(range: StrainRange<f64>) -> Option<String> {
     let least = range.lower.abs().min(range.upper.abs());
     (least > FAR_FROM_REST * range.span() && range.lower * range.upper > 0.0).then(|| {
         let least = number(least);
@@ -126,7 +127,7 @@ fn another_speed(stroke_s: f64) -> String {
     format!("repeat the strokes at a second speed: in {faster} a stroke, not only in {stroke}")
 }
 
-fn faster(range: RangeParams, stats: &MotionStats) -> String {
+fn faster(range: StrainRange<f64>, stats: &MotionStats) -> String {
     let fastest_s = range.span() / stats.fastest_rate.max(f64::MIN_POSITIVE);
     let [fastest, faster] = [fastest_s, fastest_s / 2.0].map(duration);
     format!("add strokes in {faster}, with as many rows a stroke: the fastest so far would take {fastest}")
@@ -209,7 +210,7 @@ mod tests {
         }
     }
 
-    const RANGE: RangeParams = RangeParams { lower: 0.0, upper: 0.3 };
+    const RANGE: StrainRange<f64> = StrainRange { lower: 0.0, upper: 0.3 };
 
     /// The end of a calibration has ten lines, of which two pieces of advice and a count of the rest take two.
     #[test]
@@ -218,7 +219,7 @@ mod tests {
         let others = [
             another_speed(12.3),
             faster(RANGE, &stats(0.0)),
-            near_zero(RangeParams { lower: 0.1, upper: 0.3 }).unwrap(),
+            near_zero(StrainRange { lower: 0.1, upper: 0.3 }).unwrap(),
         ];
         for advice in holds.iter().chain(&others) {
             assert!(advice.chars().count() <= 140, "{advice}");

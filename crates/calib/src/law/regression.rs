@@ -1,6 +1,7 @@
 use std::ops::Range;
 
 use nalgebra::DVector;
+use ohmstrain_model::StrainRange;
 
 use crate::CalibrationError;
 use crate::enough::check;
@@ -9,7 +10,6 @@ use crate::law::design::{Regressors, StrainScale};
 use crate::motion_stats::MotionStats;
 use crate::order::median;
 use crate::samples::Samples;
-use ohmstrain_sensor::RangeParams;
 
 /// Number of contiguous blocks of each recording that are left out in turn.
 pub(crate) const VALIDATION_BLOCKS: usize = 4;
@@ -23,7 +23,7 @@ pub(crate) struct LawRegression {
     pub recordings: Vec<RecordingRows>,
     blocks: Vec<Range<usize>>,
     pub scale: StrainScale,
-    pub range: RangeParams,
+    pub range: StrainRange<f64>,
     pub tau_bounds: (f64, f64),
 }
 
@@ -62,21 +62,21 @@ impl LawRegression {
     /// Makes a regression with rows of equal weight; see [`robust`](crate::law::robust_loss::robust).
     pub(crate) fn new(samples: &[Samples]) -> Result<Self, CalibrationError> {
         let (lower, upper) = check(samples)?;
-        Ok(Self::scaled(samples, StrainScale::of(lower, upper), RangeParams { lower, upper }))
+        Ok(Self::scaled(samples, StrainScale::of(lower, upper), StrainRange { lower, upper }))
     }
 
     /// Makes a regression on the strain scale of other sensors, for laws that hold at least in a given range.
     pub(crate) fn on_scale(
         samples: &[Samples],
         scale: StrainScale,
-        at_least: RangeParams,
+        at_least: StrainRange<f64>,
     ) -> Result<Self, CalibrationError> {
         let (lower, upper) = check(samples)?;
-        let range = RangeParams { lower: lower.min(at_least.lower), upper: upper.max(at_least.upper) };
+        let range = StrainRange { lower: lower.min(at_least.lower), upper: upper.max(at_least.upper) };
         Ok(Self::scaled(samples, scale, range))
     }
 
-    fn scaled(samples: &[Samples], scale: StrainScale, range: RangeParams) -> Self {
+    fn scaled(samples: &[Samples], scale: StrainScale, range: StrainRange<f64>) -> Self {
         let stride = samples.iter().map(Samples::len).sum::<usize>().div_ceil(MOST_ROWS);
         let recordings: Vec<RecordingRows> = samples
             .iter()

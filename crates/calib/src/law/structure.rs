@@ -1,11 +1,12 @@
 use std::str::FromStr;
 
 use nalgebra::DVector;
+use ohmstrain_model::{Branch, Gauge};
 
 use crate::CalibrationError;
 use crate::law::design::{BRANCH_COLUMNS, StrainScale};
 use crate::law::regression::{Design, LawRegression};
-use ohmstrain_sensor::{BranchParams, GaugeParams, LawParams};
+use ohmstrain_sensor::LawParams;
 
 /// Families of gauge curves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,12 +77,12 @@ impl LawStructure {
     pub(crate) fn of_law(law: &LawParams, span: f64, ridge: f64) -> Self {
         let mut nonlinear: Vec<f64> = law.branches.iter().map(|branch| branch.tau_s.ln()).collect();
         let family = match law.gauge {
-            GaugeParams::Polynomial { .. } => GaugeFamily::Polynomial,
-            GaugeParams::DecayingExponential { decay_strain, .. } => {
+            Gauge::Polynomial { .. } => GaugeFamily::Polynomial,
+            Gauge::DecayingExponential { decay_strain, .. } => {
                 nonlinear.push((decay_strain / span).ln());
                 GaugeFamily::DecayingExponential
             }
-            GaugeParams::Tunnelling { gap, barrier, path_loss } => {
+            Gauge::Tunnelling { gap, barrier, path_loss } => {
                 nonlinear.extend([(1.0 + gap * span).ln(), barrier * span, path_loss * span * span]);
                 GaugeFamily::Tunnelling
             }
@@ -106,7 +107,7 @@ impl LawStructure {
                 columns.push(regression.column(|r| r.regressors.of_strain(|x| x / span * (-x / decay).exp())));
             }
             GaugeFamily::Tunnelling => {
-                let curve = tunnelling(gauge, span).to_model();
+                let curve = tunnelling(gauge, span);
                 offset = regression.column(|r| r.regressors.of_strain(|x| curve.value_and_slope(x).0));
             }
         }
@@ -142,11 +143,11 @@ impl LawStructure {
         let StrainScale { centre, span } = scale;
         let mut weights = vec![0.0];
         match law.gauge {
-            GaugeParams::Polynomial { coefficients: [a, b, c] } => {
+            Gauge::Polynomial { coefficients: [a, b, c] } => {
                 weights.extend([a * span, b * span.powi(2), c * span.powi(3)]);
             }
-            GaugeParams::DecayingExponential { slope, .. } => weights.push(slope * span),
-            GaugeParams::Tunnelling { .. } => {}
+            Gauge::DecayingExponential { slope, .. } => weights.push(slope * span),
+            Gauge::Tunnelling { .. } => {}
         }
         weights.extend([law.extend_viscosity_s * span, law.retract_viscosity_s * span]);
         for branch in &law.branches {
@@ -172,9 +173,9 @@ impl LawStructure {
         let mut next = || rest.next().unwrap_or(0.0);
         let gauge = match self.family {
             GaugeFamily::Polynomial => {
-                GaugeParams::Polynomial { coefficients: [next() / span, next() / span.powi(2), next() / span.powi(3)] }
+                Gauge::Polynomial { coefficients: [next() / span, next() / span.powi(2), next() / span.powi(3)] }
             }
-            GaugeFamily::DecayingExponential => GaugeParams::DecayingExponential {
+            GaugeFamily::DecayingExponential => Gauge::DecayingExponential {
                 slope: next() / span,
                 decay_strain: self.nonlinear[self.taus].exp() * span,
             },
@@ -185,7 +186,7 @@ impl LawStructure {
             .iter()
             .map(|ln_tau| {
                 let [extend, retract, extend_slope, retract_slope] = [next(), next(), next(), next()];
-                BranchParams {
+                Branch {
                     tau_s: ln_tau.exp(),
                     extend_gain: (extend - extend_slope * centre / span) / span,
                     retract_gain: (retract - retract_slope * centre / span) / span,
@@ -199,8 +200,8 @@ impl LawStructure {
 }
 
 /// Returns the tunnelling curve, given parameters of order one.
-fn tunnelling(parameters: &[f64], span: f64) -> GaugeParams {
-    GaugeParams::Tunnelling {
+fn tunnelling(parameters: &[f64], span: f64) -> Gauge<f64> {
+    Gauge::Tunnelling {
         gap: (parameters[0].exp() - 1.0) / span,
         barrier: parameters[1] / span,
         path_loss: parameters[2] / (span * span),

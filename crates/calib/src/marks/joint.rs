@@ -1,6 +1,7 @@
 //! Joint fit of motion and law: the most probable motion given the readings, with its covariance.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
+use ohmstrain_model::StrainRange;
 
 use crate::CalibrationError;
 use crate::law::design::StrainScale;
@@ -10,7 +11,6 @@ use crate::law::structure::LawStructure;
 use crate::marks::motion::MarkedMotion;
 use crate::order::median;
 use crate::samples::Samples;
-use ohmstrain_sensor::RangeParams;
 
 /// Largest number of rows in the fit.
 const MOST_ROWS: usize = 1000;
@@ -44,7 +44,7 @@ struct Problem<'a> {
     time_s: &'a [f64],
     reading: &'a [f64],
     /// Range of the marks' strains, by which the law is scaled.
-    range: RangeParams,
+    range: StrainRange<f64>,
     /// Readings over their median in the complete rows.
     response: DVector<f64>,
     /// Index of the move of each complete row. Such rows have a reading and lie between the first mark and the last.
@@ -54,7 +54,11 @@ struct Problem<'a> {
 }
 
 /// Fits `motion`. Moves that the law does not explain as regular ones become irregular.
-pub(crate) fn fit(samples: &Samples, mut motion: MarkedMotion, range: RangeParams) -> Result<Fitted, CalibrationError> {
+pub(crate) fn fit(
+    samples: &Samples,
+    mut motion: MarkedMotion,
+    range: StrainRange<f64>,
+) -> Result<Fitted, CalibrationError> {
     let stride = samples.len().div_ceil(MOST_ROWS).max(1);
     let thinned = |values: &[f64]| values.iter().copied().step_by(stride).collect::<Vec<f64>>();
     let (time_s, reading) = (thinned(samples.time_s), thinned(samples.reading));
@@ -112,7 +116,7 @@ impl<'a> Problem<'a> {
         time_s: &'a [f64],
         reading: &'a [f64],
         motion: &MarkedMotion,
-        range: RangeParams,
+        range: StrainRange<f64>,
     ) -> Result<Self, CalibrationError> {
         let place = |k: usize| motion.move_at(time_s[k]).filter(|_| reading[k].is_finite()).map(|of_move| (k, of_move));
         let (complete, of_move): (Vec<usize>, Vec<usize>) = (0..time_s.len()).filter_map(place).unzip();

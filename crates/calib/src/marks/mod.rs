@@ -12,13 +12,14 @@ mod motion;
 mod pace;
 
 use nalgebra::DVector;
+use ohmstrain_model::StrainRange;
 
 use crate::CalibrationError;
 use crate::calibrate::calibrate_once;
 use crate::law::fit::LawOptions;
 use crate::order::extent;
 use crate::samples::Samples;
-use ohmstrain_sensor::{EstimatorKind, RangeParams};
+use ohmstrain_sensor::EstimatorKind;
 
 use joint::fit;
 pub use mark::{Mark, MarksError};
@@ -67,7 +68,7 @@ pub fn marked_references(
         ranges.push(mark::check(marks, samples.time_s).map_err(in_recording)?);
     }
     let (lower, upper) = extent(ranges.into_iter().flat_map(<[f64; 2]>::from));
-    let range = RangeParams { lower, upper };
+    let range = StrainRange { lower, upper };
     let motions = |shape: f64| -> Vec<MarkedMotion> {
         let of_one = |(samples, marks): (&Samples, &Vec<Mark>)| MarkedMotion::new(samples, marks, range.span(), shape);
         recordings.iter().zip(marks).map(of_one).collect()
@@ -93,7 +94,11 @@ fn score(recordings: &[Samples], motions: &[MarkedMotion]) -> Result<f64, Calibr
     calibration.estimators.get(&EstimatorKind::Ekf).map(|params| params.score).ok_or(CalibrationError::Singular)
 }
 
-fn reference(samples: &Samples, motion: MarkedMotion, range: RangeParams) -> Result<MarkedReference, CalibrationError> {
+fn reference(
+    samples: &Samples,
+    motion: MarkedMotion,
+    range: StrainRange<f64>,
+) -> Result<MarkedReference, CalibrationError> {
     let fitted = fit(samples, motion, range)?;
     let (strain, strain_sd) = fitted.strains(samples.time_s);
     let motion = &fitted.motion;

@@ -1,4 +1,5 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
+use ohmstrain_model::StrainRange;
 use serde::{Deserialize, Serialize};
 
 use super::probe::common;
@@ -9,7 +10,6 @@ use crate::law::regression::{Design, LawRegression, VALIDATION_BLOCKS};
 use crate::law::robust_loss::robust;
 use crate::law::structure::{LawFit, LawStructure};
 use crate::samples::{Samples, usual_step_s};
-use ohmstrain_sensor::RangeParams;
 
 /// The law of one more sensor of the make: a cubic gauge and branches with the make's time constants.
 ///
@@ -20,7 +20,7 @@ use ohmstrain_sensor::RangeParams;
 pub struct LawPrior {
     /// Strains of the make, by which `mean` is scaled. In powers of the gauge and in dash-pots, x is the strain over the span; in gains
     /// that grow with strain, it is the distance from the middle over the span.
-    pub range: RangeParams,
+    pub range: StrainRange<f64>,
     /// Time constants, s, fastest first.
     pub tau_s: Vec<f64>,
     /// Spectral density of the law's residual at low frequency, s, one-sided in time: variance, relative to R₀, times twice the correlation

@@ -1,6 +1,7 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{Cholesky, DMatrix, DVector};
+use ohmstrain_model::StrainRange;
 
 use super::law::LawPrior;
 use super::noise::EstimatorPrior;
@@ -9,9 +10,7 @@ use super::probe::Probe;
 use super::rows::CorrectionPrior;
 use super::{FEWEST_SENSORS, PRIOR_FORMAT, Prior, median};
 use crate::CalibrationError;
-use ohmstrain_sensor::{
-    CorrectionParams, EstimatorKind, EstimatorParams, LawParams, RangeParams, SensorParams, Validity,
-};
+use ohmstrain_sensor::{CorrectionParams, EstimatorKind, EstimatorParams, LawParams, SensorParams, Validity};
 
 /// Least assumed spread of a weight between sensors, relative to the mean; and a variance, relative to R₀, that keeps a covariance regular.
 const LEAST_SPREAD: f64 = 0.01;
@@ -55,7 +54,7 @@ impl Prior {
 }
 
 fn law(sensors: &[SensorParams], validity: &Validity) -> Result<LawPrior, CalibrationError> {
-    let range = RangeParams { lower: validity.lower, upper: validity.upper };
+    let range = StrainRange { lower: validity.lower, upper: validity.upper };
     let laws: Vec<&LawParams> = sensors.iter().map(|sensor| &sensor.law).collect();
     let tau_s = time_constants(&laws);
     let probe = Probe::new(range, validity.fastest_rate_per_s, &tau_s)?;

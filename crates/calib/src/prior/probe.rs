@@ -1,4 +1,5 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use ohmstrain_model::StrainRange;
 
 use crate::CalibrationError;
 use crate::dense::product;
@@ -7,7 +8,7 @@ use crate::law::robust_loss::robust;
 use crate::law::structure::GaugeFamily;
 use crate::law::structure::LawStructure;
 use crate::samples::Samples;
-use ohmstrain_sensor::{LawParameter, LawParams, RangeParams, Uncertainty};
+use ohmstrain_sensor::{LawParameter, LawParams, Uncertainty};
 
 /// Motion over the whole range at three speeds, with holds and smaller loops. Laws with the same readings for it count as the same.
 ///
@@ -33,7 +34,7 @@ const STEP: f64 = 1e-4;
 
 impl Probe {
     /// Creates the probe for laws with these time constants; `fastest` is in 1/s.
-    pub(super) fn new(range: RangeParams, fastest: f64, tau_s: &[f64]) -> Result<Self, CalibrationError> {
+    pub(super) fn new(range: StrainRange<f64>, fastest: f64, tau_s: &[f64]) -> Result<Self, CalibrationError> {
         let (time_s, strain) = motion(range, fastest);
         // The values of the readings do not matter, as long as they vary.
         let reading: Vec<f64> = strain.iter().map(|strain| 1.0 + (strain - range.lower) / range.span()).collect();
@@ -84,7 +85,7 @@ pub(super) fn common(tau_s: &[f64]) -> LawStructure {
     LawStructure { family: GaugeFamily::Polynomial, nonlinear, taus: tau_s.len(), ridge: 0.0 }
 }
 
-fn motion(range: RangeParams, fastest: f64) -> (Vec<f64>, Vec<f64>) {
+fn motion(range: StrainRange<f64>, fastest: f64) -> (Vec<f64>, Vec<f64>) {
     let (mut time_s, mut strain) = (vec![0.0], vec![range.lower]);
     let mut now_s = 0.0;
     for speed in SPEEDS {

@@ -1,9 +1,9 @@
-use ohmstrain_ekf::correction::{FEATURES, RATE_GAIN};
+use ohmstrain_ekf::correction::{FEATURES, FeatureScale, RATE_GAIN};
 use serde::{Deserialize, Serialize};
 
 use super::median;
 use crate::calibrate::correction_fit::{PAUSE_S, rounded};
-use ohmstrain_sensor::{CorrectionParams, CorrectionScale, EstimatorKind, FUTURE_FEATURES, TrainingRow};
+use ohmstrain_sensor::{CorrectionParams, EstimatorKind, FUTURE_FEATURES, TrainingRow};
 
 /// Number of rows of other sensors that a correction learns from; of the new sensor's own it uses at most as many.
 pub(crate) const ROWS: usize = 100;
@@ -17,7 +17,7 @@ pub struct CorrectionPrior {
     /// The filter that it corrects.
     pub corrects: EstimatorKind,
     /// Scale of the readings of the median sensor.
-    pub readings: CorrectionScale,
+    pub readings: FeatureScale<f64>,
     /// Rows of all sensors, in order of time.
     pub rows: Vec<TrainingRow>,
 }
@@ -26,7 +26,7 @@ impl CorrectionPrior {
     /// Collects rows from the corrections of several sensors, all of one filter; `None` without any.
     pub(super) fn learn(sensors: &[&CorrectionParams]) -> Option<Self> {
         let first = sensors.first()?;
-        let scales: Vec<CorrectionScale> = sensors.iter().map(|one| one.readings).collect();
+        let scales: Vec<FeatureScale<f64>> = sensors.iter().map(|one| one.readings).collect();
         let of_make = median_scale(&scales);
         let mut rows: Vec<TrainingRow> = Vec::new();
         let mut start_s = 0.0;
@@ -46,11 +46,11 @@ impl CorrectionPrior {
 }
 
 /// Returns the median of each number; starts are first converted to the median scale.
-fn median_scale(scales: &[CorrectionScale]) -> CorrectionScale {
-    let of = |number: &dyn Fn(&CorrectionScale) -> f64| median(scales.iter().map(number));
+fn median_scale(scales: &[FeatureScale<f64>]) -> FeatureScale<f64> {
+    let of = |number: &dyn Fn(&FeatureScale<f64>) -> f64| median(scales.iter().map(number));
     let (centre, half_range) = (of(&|scale| scale.centre), of(&|scale| scale.half_range));
     let start = |i: usize, part: usize| of(&|scale| start_on(scale, scale.starts[i], (centre, half_range))[part]);
-    CorrectionScale {
+    FeatureScale {
         centre,
         half_range,
         rates: [0, 1].map(|i| of(&|scale| scale.rates[i])),
@@ -59,12 +59,12 @@ fn median_scale(scales: &[CorrectionScale]) -> CorrectionScale {
 }
 
 /// Converts a low-pass's starting values to a scale of another centre and half range.
-fn start_on(scale: &CorrectionScale, [a, b]: [f64; 2], (centre, half_range): (f64, f64)) -> [f64; 2] {
+fn start_on(scale: &FeatureScale<f64>, [a, b]: [f64; 2], (centre, half_range): (f64, f64)) -> [f64; 2] {
     [(a * scale.half_range + (b - 1.0) * (centre - scale.centre)) / half_range, b]
 }
 
 /// Converts a row to another scale.
-fn moved(row: &TrainingRow, from: &CorrectionScale, to: &CorrectionScale) -> TrainingRow {
+fn moved(row: &TrainingRow, from: &FeatureScale<f64>, to: &FeatureScale<f64>) -> TrainingRow {
     let size = from.half_range / to.half_range;
     let rate = |i: usize, bounded: f64| {
         let most = 1.0 - LEAST_FROM_BOUND;
@@ -90,9 +90,9 @@ mod tests {
     /// Compares with the features themselves, computed on both scales.
     #[test]
     fn rows_are_what_the_other_scale_would_have_seen() {
-        let scale = |centre, half_range, rates| CorrectionScale { centre, half_range, rates, starts: settled() };
+        let scale = |centre, half_range, rates| FeatureScale { centre, half_range, rates, starts: settled() };
         let (from, to) = (scale(0.3, 0.25, [0.08, 0.05]), scale(0.2, 0.4, [0.11, 0.02]));
-        let (mut on_from, mut on_to) = (ReadingFeatures::new(from.past()), ReadingFeatures::new(to.past()));
+        let (mut on_from, mut on_to) = (ReadingFeatures::new(from), ReadingFeatures::new(to));
         for k in 0..200 {
             let reading = Some(0.3 + 0.2 * (0.1 * f64::from(k)).sin());
             let (Some(past), Some(expected)) = (on_from.step(0.1, reading), on_to.step(0.1, reading)) else {
@@ -113,7 +113,7 @@ mod tests {
     #[test]
     fn starts_are_moved_with_the_scale() {
         let (centre, half_range, start) = (0.3, 0.25, [0.3, 0.4]);
-        let scale = CorrectionScale { centre, half_range, rates: [0.1; 2], starts: settled() };
+        let scale = FeatureScale { centre, half_range, rates: [0.1; 2], starts: settled() };
         let low_pass = |centre: f64, half_range: f64, [a, b]: [f64; 2], reading: f64| {
             centre + half_range * (a + b * (reading - centre) / half_range)
         };

@@ -1,11 +1,12 @@
 use super::*;
 use crate::samples::Samples;
-use ohmstrain_sensor::{GaugeParams, LawParams, RangeParams, SensorParams};
+use ohmstrain_model::{Gauge, StrainRange};
+use ohmstrain_sensor::{LawParams, SensorParams};
 
 const SENSOR: &str = include_str!("../../tests/fixtures/representative.toml");
 const REST_OHM: f64 = 1700.0;
 const SPAN: f64 = 0.3;
-const RANGE: RangeParams = RangeParams { lower: 0.0, upper: SPAN };
+const RANGE: StrainRange<f64> = StrainRange { lower: 0.0, upper: SPAN };
 
 /// Returns the weights of a sensor: gauge 1.8 ε - 1.2 ε², a branch of 4 s with gains 0.9 and -0.5, which grow by -1.1 and 0.6 per strain.
 fn truth() -> Vec<f64> {
@@ -48,7 +49,7 @@ fn fitted(prior: &LawPrior) -> (LawParams, f64) {
 }
 
 fn gauge(law: &LawParams) -> [f64; 3] {
-    let GaugeParams::Polynomial { coefficients } = law.gauge else { panic!("{:?}", law.gauge) };
+    let Gauge::Polynomial { coefficients } = law.gauge else { panic!("{:?}", law.gauge) };
     coefficients
 }
 
@@ -91,7 +92,7 @@ fn sensor() -> SensorParams {
 fn scaled(factor: f64) -> SensorParams {
     let mut sensor = sensor();
     let law = &mut sensor.law;
-    let GaugeParams::Polynomial { coefficients } = &mut law.gauge else { panic!("a polynomial") };
+    let Gauge::Polynomial { coefficients } = &mut law.gauge else { panic!("a polynomial") };
     coefficients.iter_mut().for_each(|c| *c *= factor);
     law.extend_viscosity_s *= factor;
     law.retract_viscosity_s *= factor;
@@ -109,7 +110,7 @@ fn scaled(factor: f64) -> SensorParams {
 #[test]
 fn mean_and_spread_are_those_of_the_sensors() {
     let prior = Prior::learn(&[scaled(0.8), scaled(1.2), scaled(1.0)], "test").unwrap();
-    let GaugeParams::Polynomial { coefficients } = sensor().law.gauge else { panic!("a polynomial") };
+    let Gauge::Polynomial { coefficients } = sensor().law.gauge else { panic!("a polynomial") };
     let span = prior.law.range.span();
     let taus: Vec<f64> = sensor().law.branches.iter().map(|branch| branch.tau_s).collect();
     assert_eq!(prior.law.tau_s, taus);

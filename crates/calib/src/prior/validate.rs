@@ -33,7 +33,7 @@ impl Prior {
 
 impl LawPrior {
     fn validate(&self, table: &Table) -> Result<(), FieldError> {
-        self.range.validate(&table.table("range"))?;
+        table.range("range", self.range)?;
         table.numbers("tau_s", &self.tau_s, POSITIVE)?;
         table.number("error_density_s", self.error_density_s, POSITIVE)?;
         if self.tau_s.len() > MOST_BRANCHES {
@@ -76,7 +76,7 @@ impl CorrectionPrior {
         if self.corrects == EstimatorKind::Corrected {
             return Err(table.wrong("corrects", "a filter", self.corrects.name()));
         }
-        self.readings.validate(&table.table("readings"))?;
+        table.scale("readings", &self.readings)?;
         if !ROWS.contains(&self.rows.len()) {
             let expected = format!("{} to {} entries", ROWS.start(), ROWS.end());
             return Err(table.wrong("rows", expected, self.rows.len()));

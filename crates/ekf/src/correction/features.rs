@@ -22,7 +22,7 @@ const PASSED_OVER: f64 = 3.0;
 
 /// Scale of the readings `R/R₀ - 1`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct FeatureScale<T> {
     /// The reading that counts as zero: the middle of the range in calibration.
     pub centre: T,
@@ -44,6 +44,13 @@ impl FeatureScale<f64> {
             rates: self.rates.map(T::of),
             starts: self.starts.map(|line| line.map(T::of)),
         }
+    }
+
+    /// Returns the scale for features of the future. Their low-passes start settled on the last reading: with fitted starts,
+    /// smoothers were overconfident in other motions.
+    #[must_use]
+    pub fn future(self) -> Self {
+        Self { starts: settled(), ..self }
     }
 }
 

@@ -63,8 +63,8 @@ macro_rules! mixture_filter {
                 prepared: &Self,
                 reading: Option<Reading<T>>,
                 next: &Self::State,
-            ) -> Result<Option<Self::State>, StepError> {
-                prepared.back(filtered, reading, next).map(Some)
+            ) -> Result<Self::State, StepError> {
+                prepared.back(filtered, reading, next)
             }
         }
     };

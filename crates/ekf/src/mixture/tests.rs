@@ -216,7 +216,7 @@ fn of(weights: &[f64]) -> State {
 
 fn back(state: &State, next: &State) -> State {
     let split = split();
-    split.smooth_back(state, &split, None, next).unwrap().unwrap()
+    split.smooth_back(state, &split, None, next).unwrap()
 }
 
 fn weights(state: &State) -> Vec<f64> {

@@ -16,17 +16,16 @@ pub struct PastStep<S, P, T> {
 /// Smooths back through past steps, newest first, from the state after the newest. `visit` receives the smoothed state at
 /// the start of each step, and returns true to continue.
 ///
-/// Only the states of the forward pass are stored; each step is recomputed, with the same result. Returns true if the
-/// estimator has a smoother.
+/// Only the states of the forward pass are stored; each step is recomputed, with the same result.
 ///
 /// # Errors
-/// See [`StepError`]; steps that succeeded forward also succeed backward.
+/// As [`Estimator::smooth_back`].
 pub fn smooth_back_through<'a, T, E, const N: usize, const L: usize>(
     estimator: &E,
     newest: &E::State,
     steps: impl Iterator<Item = &'a PastStep<E::State, E::Prepared, T>>,
     mut visit: impl FnMut(&E::State) -> bool,
-) -> Result<bool, StepError>
+) -> Result<(), StepError>
 where
     T: Scalar,
     E: Estimator<T, N, L>,
@@ -35,13 +34,10 @@ where
 {
     let mut smoothed = newest.clone();
     for step in steps {
-        let Some(earlier) = estimator.smooth_back(&step.from, &step.prepared, step.reading, &smoothed)? else {
-            return Ok(false);
-        };
-        smoothed = earlier;
+        smoothed = estimator.smooth_back(&step.from, &step.prepared, step.reading, &smoothed)?;
         if !visit(&smoothed) {
             break;
         }
     }
-    Ok(true)
+    Ok(())
 }

@@ -108,8 +108,9 @@ impl HandFirmware {
 
 #[cfg(test)]
 mod tests {
+    use ohmstrain_model::StrainRange;
+    use ohmstrain_sensor::Quantity;
     use ohmstrain_sensor::fusion::{FUSION_FORMAT, FusionErrors, FusionParams, FusionRow, RegressionParams};
-    use ohmstrain_sensor::{Quantity, RangeParams};
 
     /// Returns a fusion of three channels with curves of their own, one of which sees the rate.
     pub(super) fn fusion() -> FusionParams {
@@ -132,7 +133,7 @@ mod tests {
             channel_sd: vec![0.02; 3],
             low_pass_s: vec![1.0],
             quantity: Quantity::Strain,
-            limits: RangeParams { lower: 0.0, upper: 0.3 },
+            limits: StrainRange { lower: 0.0, upper: 0.3 },
             errors: errors(4),
             filters: Some(errors(3)),
             smoothers: None,

@@ -293,14 +293,14 @@ fn advice(advice: &[String], elsewhere: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use ohmstrain_sensor::RangeParams;
+    use ohmstrain_model::StrainRange;
 
     use super::*;
 
     #[test]
     fn one_speed_is_one_number() {
         let with = |quartile_speeds, fastest_rate| {
-            let range = RangeParams { lower: 0.0, upper: 0.4 };
+            let range = StrainRange { lower: 0.0, upper: 0.4 };
             let seen = RecordingSummary {
                 range,
                 tenths: [0.1; 10],

@@ -15,6 +15,8 @@ import pyarrow.compute as pc
 from . import _core, _tables
 from ._sensor import Sensor, _choices, _options, _split
 
+#: Columns that distinguish recordings, that of the sensor first.
+BY = ("sensor_id", "recording_id")
 #: Column with the error of a recording; null in rows of good recordings.
 ERROR = "error"
 #: Column with the warnings about a recording, in its first row; null otherwise.

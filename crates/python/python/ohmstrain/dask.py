@@ -14,14 +14,11 @@ from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
 
-from ._groups import Work
+from ._groups import BY, Work
 from ._tables import COLUMNS
 
 if TYPE_CHECKING:
     from dask.dataframe import DataFrame
-
-#: Columns that distinguish recordings, that of the sensor first.
-BY = ("sensor_id", "recording_id")
 
 
 def filter(df: DataFrame, sensors: Any, by: Iterable[str] = BY, **options: Any) -> DataFrame:

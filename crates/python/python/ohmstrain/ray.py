@@ -14,13 +14,10 @@ from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
 
-from ._groups import Work
+from ._groups import BY, Work
 
 if TYPE_CHECKING:
     from ray.data import Dataset
-
-#: Columns that distinguish recordings, that of the sensor first.
-BY = ("sensor_id", "recording_id")
 
 
 def filter(ds: Dataset, sensors: Any, by: Iterable[str] = BY, **options: Any) -> Dataset:

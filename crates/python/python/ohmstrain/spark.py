@@ -17,14 +17,11 @@ from typing import TYPE_CHECKING, Any
 import pyarrow as pa
 from pyspark.sql.pandas.types import from_arrow_schema, to_arrow_type
 
-from ._groups import Work
+from ._groups import BY, Work
 from ._tables import COLUMNS
 
 if TYPE_CHECKING:
     from pyspark.sql import DataFrame
-
-#: Columns that distinguish recordings, that of the sensor first.
-BY = ("sensor_id", "recording_id")
 
 
 def filter(df: DataFrame, sensors: Any, by: Iterable[str] = BY, *, streaming: bool = False, **options: Any) -> DataFrame:

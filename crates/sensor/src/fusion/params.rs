@@ -1,7 +1,7 @@
+use ohmstrain_model::StrainRange;
 use serde::{Deserialize, Serialize};
 
 use crate::params::Quantity;
-use crate::params::range::RangeParams;
 use crate::params::validate::FieldError;
 use crate::params::validate::table::{Allowed, FACTOR, POSITIVE, SIGNED, Table};
 
@@ -32,13 +32,13 @@ pub struct FusionParams {
     /// The estimated quantity.
     pub quantity: Quantity,
     /// Range of the output.
-    pub limits: RangeParams,
+    pub limits: StrainRange<f64>,
     /// Errors of the channels' filters and of the regressions.
     pub errors: FusionErrors,
     /// Errors of the channels' filters alone, for a microcontroller; `None` if nothing was held out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub filters: Option<FusionErrors>,
-    /// Errors of the channels' smoothers and of the regressions; `None` if a channel has no smoother.
+    /// Errors of the channels' smoothers and of the regressions; `None` if nothing was held out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub smoothers: Option<FusionErrors>,
     /// Regressions of the strain on all channels' readings.
@@ -100,7 +100,7 @@ impl FusionParams {
     /// Names the first number outside its range, or a list whose length does not match the number of channels.
     pub fn validate(&self) -> Result<(), FieldError> {
         let root = Table::root();
-        self.limits.validate(&root.table("limits"))?;
+        root.range("limits", self.limits)?;
         root.number("novelty", self.novelty, POSITIVE)?;
         root.numbers("channel_sd", &self.channel_sd, POSITIVE)?;
         if !(2..=MOST_CHANNELS).contains(&self.channels()) {

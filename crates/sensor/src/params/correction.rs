@@ -1,4 +1,4 @@
-use ohmstrain_ekf::correction::{FEATURES, FILTER_INPUTS, FeatureScale, OUTPUTS, Starts, filter_inputs, settled};
+use ohmstrain_ekf::correction::{FEATURES, FILTER_INPUTS, FeatureScale, OUTPUTS, filter_inputs};
 use serde::{Deserialize, Serialize};
 
 use crate::params::estimator::EstimatorKind;
@@ -13,7 +13,7 @@ pub struct CorrectionParams {
     /// The filter that it corrects.
     pub corrects: EstimatorKind,
     /// Scale of the readings.
-    pub readings: CorrectionScale,
+    pub readings: FeatureScale<f64>,
     /// Correction of the filter.
     pub filter: CorrectorParams,
     /// Correction of the smoother.
@@ -38,20 +38,6 @@ pub struct SimulatedParams {
     pub weights: Vec<f64>,
     /// Features of the readings up to each row.
     pub rows: Vec<[f64; FEATURES]>,
-}
-
-/// Scale of the readings for a correction.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct CorrectionScale {
-    /// The change of resistance `R/R₀ - 1` that counts as zero.
-    pub centre: f64,
-    /// Distance from `centre` that counts as one.
-    pub half_range: f64,
-    /// Typical magnitudes of the readings' two rates, 1/s.
-    pub rates: [f64; 2],
-    /// Typical values of the low-passes at a reading y, a + b y; they start from these at the first reading.
-    pub starts: Starts<f64>,
 }
 
 /// Parameters of the correction of one estimate, the filter's or the smoother's.
@@ -111,22 +97,6 @@ pub struct TrainingRow {
 pub const SMOOTHER_INPUTS: usize = FILTER_INPUTS + FUTURE_FEATURES;
 /// Number of one-sided processes of the smoother's correction.
 pub const SIDES: usize = 2;
-
-impl CorrectionScale {
-    /// Returns the scale for features of the past.
-    #[must_use]
-    pub const fn past(self) -> FeatureScale<f64> {
-        let Self { centre, half_range, rates, starts } = self;
-        FeatureScale { centre, half_range, rates, starts }
-    }
-
-    /// Returns the scale for features of the future. Their low-passes start settled on the last reading: with fitted starts,
-    /// smoothers were overconfident in other motions.
-    #[must_use]
-    pub fn future(self) -> FeatureScale<f64> {
-        FeatureScale { starts: settled(), ..self.past() }
-    }
-}
 
 impl TrainingRow {
     /// Returns the inputs of the filter's correction.

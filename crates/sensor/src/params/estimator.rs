@@ -99,30 +99,7 @@ pub struct EstimatorParams {
     pub phases: Option<PhaseParams>,
     /// Relaxation of the readings while the strain is held; `None` if the calibration has no holds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub settling: Option<SettlingParams>,
-}
-
-/// Settling in the holds of the calibration: see [`Settling`].
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SettlingParams {
-    /// Duration of the longest hold, s.
-    pub horizon_s: f64,
-    /// Observed fraction of the branches' predicted relaxation.
-    pub share: f64,
-    /// Its standard deviation.
-    pub share_sd: f64,
-    /// Standard deviation of the part that does not grow with the relaxation, relative to R₀.
-    pub sd: f64,
-}
-
-impl SettlingParams {
-    /// Converts it to the form used by estimates.
-    #[must_use]
-    pub const fn to_model(self) -> Settling<f64> {
-        let Self { horizon_s, share, share_sd, sd } = self;
-        Settling { horizon_s, share, share_sd, sd }
-    }
+    pub settling: Option<Settling<f64>>,
 }
 
 /// Durations and order of phases.
@@ -179,12 +156,8 @@ impl NoiseParams {
     /// Converts it to the model's noise, for a single reading.
     #[must_use]
     pub const fn to_model(self) -> ModelNoise<f64> {
-        ModelNoise {
-            reading_sd: self.reading_sd,
-            branch_sd: self.branch_sd,
-            baseline_sd: self.baseline_sd,
-            baseline_time_s: self.baseline_time_s,
-        }
+        let Self { reading_sd, branch_sd, baseline_sd, baseline_time_s, .. } = self;
+        ModelNoise { reading_sd, branch_sd, baseline_sd, baseline_time_s }
     }
 
     /// Converts it to the model's noise, for readings every `dt_s` seconds.

@@ -1,8 +1,8 @@
 //! Findings of a calibration, stored with the sensor. No computation uses them.
 
+use ohmstrain_model::StrainRange;
 use serde::{Deserialize, Serialize};
 
-use crate::params::range::RangeParams;
 use crate::params::summary::{Limit, Summary};
 
 /// Number of tenths of a range.
@@ -35,7 +35,7 @@ pub struct Findings {
 #[serde(deny_unknown_fields)]
 pub struct RecordingSummary {
     /// Range of the reference.
-    pub range: RangeParams,
+    pub range: StrainRange<f64>,
     /// Share of the rows, 0 to 1, in each tenth of that range, lowest first.
     pub tenths: [f64; TENTHS],
     /// Lower and upper quartile of the speed in moving rows, 1/s.

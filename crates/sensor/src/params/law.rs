@@ -1,7 +1,5 @@
-use ohmstrain_model::{Branch, Gauge, SensorLaw};
+use ohmstrain_model::{Branch, Gauge, SensorLaw, StrainRange};
 use serde::{Deserialize, Serialize};
-
-use crate::params::range::RangeParams;
 
 /// Maximum number of branches.
 pub const MOST_BRANCHES: usize = 4;
@@ -15,51 +13,22 @@ pub struct LawParams {
     /// Dash-pot while releasing, s.
     pub retract_viscosity_s: f64,
     /// Range of strains on which it was fitted; beyond it, the gauge curve continues along its tangent.
-    pub range: RangeParams,
+    pub range: StrainRange<f64>,
     /// Quasi-static curve.
-    pub gauge: GaugeParams,
+    #[serde(with = "GaugeTable")]
+    pub gauge: Gauge<f64>,
     /// Relaxing branches, fastest first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub branches: Vec<BranchParams>,
+    pub branches: Vec<Branch<f64>>,
 }
 
-/// The quasi-static curve g(ε).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "family", rename_all = "kebab-case", deny_unknown_fields)]
-pub enum GaugeParams {
-    /// `a₁ ε + a₂ ε² + a₃ ε³`.
-    Polynomial {
-        /// a₁, a₂, a₃.
-        coefficients: [f64; 3],
-    },
-    /// `G ε exp(-ε/ε₀)`.
-    DecayingExponential {
-        /// G.
-        slope: f64,
-        /// ε₀.
-        decay_strain: f64,
-    },
-    /// `(1 + C ε) exp(A ε + W ε²) - 1`.
-    Tunnelling {
-        /// C.
-        gap: f64,
-        /// A.
-        barrier: f64,
-        /// W.
-        path_loss: f64,
-    },
-}
-
-impl GaugeParams {
-    /// Converts it to the model's gauge.
-    #[must_use]
-    pub const fn to_model(self) -> Gauge<f64> {
-        match self {
-            Self::Polynomial { coefficients } => Gauge::Polynomial { coefficients },
-            Self::DecayingExponential { slope, decay_strain } => Gauge::DecayingExponential { slope, decay_strain },
-            Self::Tunnelling { gap, barrier, path_loss } => Gauge::Tunnelling { gap, barrier, path_loss },
-        }
-    }
+/// Form of a gauge curve in a sensor's file.
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Gauge<f64>", tag = "family", rename_all = "kebab-case", deny_unknown_fields)]
+enum GaugeTable {
+    Polynomial { coefficients: [f64; 3] },
+    DecayingExponential { slope: f64, decay_strain: f64 },
+    Tunnelling { gap: f64, barrier: f64, path_loss: f64 },
 }
 
 /// A number of a law under its name in `sensor.toml`: `branches[0].tau_s`.
@@ -72,36 +41,20 @@ pub struct LawParameter<'a> {
     pub is_over_rest: bool,
 }
 
-/// One relaxing branch.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct BranchParams {
-    /// Time constant, s.
-    pub tau_s: f64,
-    /// Gain while stretching.
-    pub extend_gain: f64,
-    /// Gain while releasing.
-    pub retract_gain: f64,
-    /// Growth of the stretching gain with strain.
-    pub extend_gain_slope: f64,
-    /// Growth of the releasing gain with strain.
-    pub retract_gain_slope: f64,
-}
-
 impl LawParams {
     /// Returns all its numbers except the range: gauge, dash-pots, branches.
     pub fn parameters_mut(&mut self) -> Vec<LawParameter<'_>> {
         let (over_rest, not) = (true, false);
         let gauge = match &mut self.gauge {
-            GaugeParams::Polynomial { coefficients: [first, second, third] } => vec![
+            Gauge::Polynomial { coefficients: [first, second, third] } => vec![
                 ("gauge.coefficients[0]", first, over_rest),
                 ("gauge.coefficients[1]", second, over_rest),
                 ("gauge.coefficients[2]", third, over_rest),
             ],
-            GaugeParams::DecayingExponential { slope, decay_strain } => {
+            Gauge::DecayingExponential { slope, decay_strain } => {
                 vec![("gauge.slope", slope, over_rest), ("gauge.decay_strain", decay_strain, not)]
             }
-            GaugeParams::Tunnelling { gap, barrier, path_loss } => {
+            Gauge::Tunnelling { gap, barrier, path_loss } => {
                 vec![("gauge.gap", gap, not), ("gauge.barrier", barrier, not), ("gauge.path_loss", path_loss, not)]
             }
         };
@@ -132,23 +85,12 @@ impl LawParams {
     /// Converts it to the model's law; `None` unless there are exactly `B` branches.
     #[must_use]
     pub fn to_model<const B: usize>(&self) -> Option<SensorLaw<f64, B>> {
-        let branches: Vec<Branch<f64>> = self
-            .branches
-            .iter()
-            .map(|branch| Branch {
-                tau_s: branch.tau_s,
-                extend_gain: branch.extend_gain,
-                retract_gain: branch.retract_gain,
-                extend_gain_slope: branch.extend_gain_slope,
-                retract_gain_slope: branch.retract_gain_slope,
-            })
-            .collect();
         Some(SensorLaw {
-            gauge: self.gauge.to_model(),
+            gauge: self.gauge,
             extend_viscosity_s: self.extend_viscosity_s,
             retract_viscosity_s: self.retract_viscosity_s,
-            branches: branches.try_into().ok()?,
-            range: self.range.to_model(),
+            branches: self.branches.as_slice().try_into().ok()?,
+            range: self.range,
         })
     }
 }

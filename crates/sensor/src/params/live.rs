@@ -140,7 +140,7 @@ impl SensorParams {
     fn doubts(&self, motion: &MotionParams, unstated_sd: f64) -> DoubtParts<f64> {
         let (seen, span) = (&self.validity, self.limits.span());
         let (low, high) = self.relative_readings();
-        let unread = Unread::new(motion.rate_time_s, motion.rate_sd_per_s, self.limits.to_model());
+        let unread = Unread::new(motion.rate_time_s, motion.rate_sd_per_s, self.limits);
         let per_reading = self.strain_per_reading();
         let unstated =
             self.session_variance(per_reading) + self.temperature_variance(per_reading) + unstated_sd.powi(2);

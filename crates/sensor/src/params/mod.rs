@@ -5,7 +5,6 @@ pub(crate) mod estimator;
 pub(crate) mod findings;
 pub(crate) mod law;
 mod live;
-pub(crate) mod range;
 mod repeating;
 pub(crate) mod static_cubic;
 pub(crate) mod summary;
@@ -15,13 +14,13 @@ pub(crate) mod validate;
 
 use std::collections::BTreeMap;
 
+use ohmstrain_model::StrainRange;
 use serde::{Deserialize, Serialize};
 
 use crate::params::correction::CorrectionParams;
 use crate::params::estimator::{EstimatorKind, EstimatorParams, NoParameters};
 use crate::params::findings::Findings;
 use crate::params::law::LawParams;
-use crate::params::range::RangeParams;
 use crate::params::static_cubic::StaticCubic;
 use crate::params::summary::{Summary, TestedSummary};
 use crate::params::temperature::TemperatureParams;
@@ -62,7 +61,7 @@ pub struct SensorParams {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tested: Option<TestedSummary>,
     /// Range of the output: the reference's range in calibration, or a joint's stops.
-    pub limits: RangeParams,
+    pub limits: StrainRange<f64>,
     /// Calibrated range.
     pub validity: Validity,
     /// Differences between sessions; `None` for a calibration on one session.

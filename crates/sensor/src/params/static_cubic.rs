@@ -1,6 +1,5 @@
+use ohmstrain_model::StrainRange;
 use serde::{Deserialize, Serialize};
-
-use crate::params::range::RangeParams;
 
 /// Strain as a cubic polynomial of the reading, clipped to the range on which it was fitted: the usual method.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -13,7 +12,7 @@ pub struct StaticCubic {
     /// Coefficients of 1, z, z², z³ with `z = (reading - centre)/scale`.
     pub coefficients: [f64; 4],
     /// Range of strains on which it was fitted.
-    pub range: RangeParams,
+    pub range: StrainRange<f64>,
 }
 
 impl StaticCubic {
@@ -22,6 +21,6 @@ impl StaticCubic {
     pub fn strain(&self, reading: f64) -> f64 {
         let z = (reading - self.reading_centre) / self.reading_scale;
         let [a, b, c, d] = self.coefficients;
-        self.range.to_model().clamp(a + z * (b + z * (c + z * d)))
+        self.range.clamp(a + z * (b + z * (c + z * d)))
     }
 }

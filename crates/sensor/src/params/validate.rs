@@ -6,15 +6,15 @@
 mod correction;
 pub mod table;
 
+use ohmstrain_model::{Gauge, StrainRange};
 pub use table::FieldError;
 use table::{
     AMOUNT, ANY_NUMBER, Allowed, FACTOR, GAIN, LARGEST_CHANGE, NON_NEGATIVE, POSITIVE, RATE, SHARE, SIGNED, SPREAD,
     Table, check, short,
 };
 
-use crate::params::estimator::{EstimatorParams, MotionParams, NoiseParams, PhaseParams, SettlingParams};
-use crate::params::law::{GaugeParams, LawParams};
-use crate::params::range::RangeParams;
+use crate::params::estimator::{EstimatorParams, MotionParams, NoiseParams, PhaseParams};
+use crate::params::law::LawParams;
 use crate::params::static_cubic::StaticCubic;
 use crate::params::summary::{Summary, TestedSummary};
 use crate::params::temperature::TemperatureParams;
@@ -43,20 +43,16 @@ impl SensorParams {
         let root = Table::root();
         root.number("rest_reading", self.rest_reading, POSITIVE)?;
         root.some("measured_rest", self.measured_rest, POSITIVE)?;
-        if let Some(summary) = &self.summary {
-            summary.validate(&root.table("summary"))?;
-        }
+        self.summary.as_ref().map_or(Ok(()), |summary| summary.validate(&root.table("summary")))?;
         self.tested.map_or(Ok(()), |tested| tested.validate(&root.table("tested")))?;
-        self.limits.validate(&root.table("limits"))?;
+        root.range("limits", self.limits)?;
         self.validity.validate(&root.table("validity"))?;
         self.check_rest(&root)?;
         self.sessions.map_or(Ok(()), |sessions| sessions.validate(&root.table("sessions")))?;
         self.unstated.validate(&root.table("unstated"))?;
         self.temperature.map_or(Ok(()), |temperature| temperature.validate(&root.table("temperature")))?;
         self.static_cubic.validate(&root.table("static_cubic"))?;
-        if let Some(joint) = &self.joint {
-            joint.validate(&root.table("joint"))?;
-        }
+        self.joint.as_ref().map_or(Ok(()), |joint| joint.validate(&root.table("joint")))?;
         self.law.validate(&root.table("law"))?;
         for (kind, estimator) in &self.estimators {
             estimator.validate(&root.table("estimators").table(kind.name()), self.limits)?;
@@ -64,14 +60,10 @@ impl SensorParams {
         for (index, recording) in self.recordings.iter().enumerate() {
             recording.validate(&root.entry("recordings", index))?;
         }
-        if let Some(uncertainty) = &self.uncertainty {
-            uncertainty.validate(&root.table("uncertainty"))?;
-        }
+        self.uncertainty.as_ref().map_or(Ok(()), |uncertainty| uncertainty.validate(&root.table("uncertainty")))?;
         self.correction.as_ref().map_or(Ok(()), |correction| correction.validate(&root.table("correction")))
     }
-}
 
-impl SensorParams {
     /// Rejects an R₀ in another unit than the readings, or with a digit too many.
     fn check_rest(&self, root: &Table) -> Result<(), FieldError> {
         let Validity { reading_lower, reading_upper, .. } = self.validity;
@@ -136,13 +128,13 @@ impl TemperatureParams {
     }
 }
 
-impl RangeParams {
-    /// Checks every number.
+impl Table {
+    /// Checks a range of strains.
     ///
     /// # Errors
     /// Names the first number outside its range.
-    pub fn validate(self, table: &Table) -> Result<(), FieldError> {
-        ends(table, ["lower", "upper"], self.lower, self.upper, SIGNED)
+    pub fn range(&self, name: &str, range: StrainRange<f64>) -> Result<(), FieldError> {
+        ends(&self.table(name), ["lower", "upper"], range.lower, range.upper, SIGNED)
     }
 }
 
@@ -173,7 +165,7 @@ impl StaticCubic {
     fn validate(&self, table: &Table) -> Result<(), FieldError> {
         check!(table, self; reading_centre: POSITIVE, reading_scale: POSITIVE)?;
         table.numbers("coefficients", &self.coefficients, SIGNED)?;
-        self.range.validate(&table.table("range"))
+        table.range("range", self.range)
     }
 }
 
@@ -191,8 +183,8 @@ impl JointParams {
 impl LawParams {
     fn validate(&self, table: &Table) -> Result<(), FieldError> {
         check!(table, self; extend_viscosity_s: SIGNED, retract_viscosity_s: SIGNED)?;
-        self.range.validate(&table.table("range"))?;
-        self.gauge.validate(&table.table("gauge"), self.range)?;
+        table.range("range", self.range)?;
+        check_gauge(&table.table("gauge"), &self.gauge, self.range)?;
         for (index, branch) in self.branches.iter().enumerate() {
             let table = table.entry("branches", index);
             check!(
@@ -205,55 +197,48 @@ impl LawParams {
     }
 }
 
-impl GaugeParams {
-    /// Checks every number by itself, and then the gauge over the strains of the law.
-    fn validate(&self, table: &Table, range: RangeParams) -> Result<(), FieldError> {
-        match self {
-            Self::Polynomial { coefficients } => table.numbers("coefficients", coefficients, SIGNED)?,
-            Self::DecayingExponential { slope, decay_strain } => {
-                table.number("slope", *slope, SIGNED)?;
-                table.number("decay_strain", *decay_strain, SIGNED)?;
-            }
-            Self::Tunnelling { gap, barrier, path_loss } => {
-                table.number("gap", *gap, SIGNED)?;
-                table.number("barrier", *barrier, SIGNED)?;
-                table.number("path_loss", *path_loss, SIGNED)?;
-            }
+/// Checks every number of a gauge by itself, and then the gauge over the strains of the law.
+fn check_gauge(table: &Table, gauge: &Gauge<f64>, range: StrainRange<f64>) -> Result<(), FieldError> {
+    match gauge {
+        Gauge::Polynomial { coefficients } => table.numbers("coefficients", coefficients, SIGNED)?,
+        Gauge::DecayingExponential { slope, decay_strain } => {
+            table.number("slope", *slope, SIGNED)?;
+            table.number("decay_strain", *decay_strain, SIGNED)?;
         }
-        let gauge = self.to_model();
-        for point in 0..=GAUGE_POINTS {
-            let strain = range.lower + range.span() * f64::from(point) / f64::from(GAUGE_POINTS);
-            let (value, slope) = gauge.value_and_slope(strain);
-            let steepest = LARGEST_CHANGE / range.span();
-            if !(value.abs() <= LARGEST_CHANGE && slope.abs() <= steepest) {
-                let expected = format!("changes of resistance up to {LARGEST_CHANGE:e} R0 within `law.range`");
-                let found = format!("{} with slope {} at {}", short(value), short(slope), short(strain));
-                return Err(table.wrong_itself(expected, found));
-            }
+        Gauge::Tunnelling { gap, barrier, path_loss } => {
+            table.number("gap", *gap, SIGNED)?;
+            table.number("barrier", *barrier, SIGNED)?;
+            table.number("path_loss", *path_loss, SIGNED)?;
         }
-        Ok(())
     }
+    for point in 0..=GAUGE_POINTS {
+        let strain = range.lower + range.span() * f64::from(point) / f64::from(GAUGE_POINTS);
+        let (value, slope) = gauge.value_and_slope(strain);
+        let steepest = LARGEST_CHANGE / range.span();
+        if !(value.abs() <= LARGEST_CHANGE && slope.abs() <= steepest) {
+            let expected = format!("changes of resistance up to {LARGEST_CHANGE:e} R0 within `law.range`");
+            let found = format!("{} with slope {} at {}", short(value), short(slope), short(strain));
+            return Err(table.wrong_itself(expected, found));
+        }
+    }
+    Ok(())
 }
 
 impl EstimatorParams {
-    fn validate(&self, table: &Table, limits: RangeParams) -> Result<(), FieldError> {
+    fn validate(&self, table: &Table, limits: StrainRange<f64>) -> Result<(), FieldError> {
         check!(table, self; score: ANY_NUMBER, strain_sd_scale: FACTOR)?;
         table.some("smoothed_sd_scale", self.smoothed_sd_scale, FACTOR)?;
         self.motion.validate(&table.table("motion"), limits)?;
         self.noise.validate(&table.table("noise"))?;
         self.phases.map_or(Ok(()), |phases| phases.validate(&table.table("phases")))?;
-        self.settling.map_or(Ok(()), |settling| settling.validate(&table.table("settling")))
-    }
-}
-
-impl SettlingParams {
-    fn validate(&self, table: &Table) -> Result<(), FieldError> {
-        check!(table, self; horizon_s: POSITIVE, share: SHARE, share_sd: AMOUNT, sd: AMOUNT)
+        let Some(settling) = self.settling else { return Ok(()) };
+        let table = table.table("settling");
+        check!(table, settling; horizon_s: POSITIVE, share: SHARE, share_sd: AMOUNT, sd: AMOUNT)
     }
 }
 
 impl MotionParams {
-    fn validate(&self, table: &Table, limits: RangeParams) -> Result<(), FieldError> {
+    fn validate(&self, table: &Table, limits: StrainRange<f64>) -> Result<(), FieldError> {
         let Self { rate_time_s, rate_sd_per_s, strain_mean, strain_sd } = *self;
         table.number("rate_sd_per_s", rate_sd_per_s, RATE)?;
         let beyond = MEAN_BEYOND * limits.span();

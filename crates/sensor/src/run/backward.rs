@@ -30,8 +30,7 @@ impl<S: Clone> Backward<S> {
         Self { smoothed: last, ahead: None }
     }
 
-    /// Passes a row, calls `show` with its smoothed state, and moves on to the row before it only if `is_to_go_on`. Returns true if
-    /// the estimator has a smoother.
+    /// Passes a row, calls `show` with its smoothed state, and moves on to the row before it only if `is_to_go_on`.
     pub(crate) fn over<E, const N: usize, const L: usize>(
         &mut self,
         estimator: &Substeps<E>,
@@ -39,7 +38,7 @@ impl<S: Clone> Backward<S> {
         row: &KeptStep<E, N, L>,
         is_to_go_on: bool,
         show: impl FnOnce(&S),
-    ) -> Result<bool, StepError>
+    ) -> Result<(), StepError>
     where
         E: Estimator<f64, N, L, State = S>,
     {
@@ -49,7 +48,7 @@ impl<S: Clone> Backward<S> {
             KeptStep::Read(step) => {
                 show(&self.smoothed);
                 if is_to_go_on {
-                    let Some(earlier) = earlier(step, &self.smoothed)? else { return Ok(false) };
+                    let earlier = earlier(step, &self.smoothed)?;
                     let smoothed = mem::replace(&mut self.smoothed, earlier);
                     self.ahead = Some((time_s, step.reading, smoothed));
                 }
@@ -59,21 +58,16 @@ impl<S: Clone> Backward<S> {
                     None => show(predicted),
                     Some((ahead_s, reading, smoothed)) => {
                         let prepared = estimator.prepare(ahead_s - time_s);
-                        let Some(between) = estimator.smooth_back(predicted, &prepared, *reading, smoothed)? else {
-                            return Ok(false);
-                        };
-                        show(&between);
+                        show(&estimator.smooth_back(predicted, &prepared, *reading, smoothed)?);
                     }
                 }
                 if let Some(step) = whole.as_ref().filter(|_| is_to_go_on) {
                     // Without a later reading, the state before these steps needs no smoothing.
-                    let before =
-                        if self.ahead.is_some() { earlier(step, &self.smoothed)? } else { Some(step.from.clone()) };
-                    let Some(before) = before else { return Ok(false) };
-                    self.smoothed = before;
+                    self.smoothed =
+                        if self.ahead.is_some() { earlier(step, &self.smoothed)? } else { step.from.clone() };
                 }
             }
         }
-        Ok(true)
+        Ok(())
     }
 }

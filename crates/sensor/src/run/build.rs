@@ -9,9 +9,8 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::params::SensorParams;
-use crate::params::estimator::{EstimatorKind, EstimatorParams, NoParameters, SettlingParams};
+use crate::params::estimator::{EstimatorKind, EstimatorParams, NoParameters};
 use crate::params::law::LawParams;
-use crate::params::range::RangeParams;
 use crate::run::learned::Learned;
 use crate::run::options::Options;
 use crate::run::remembering::Remembering;
@@ -98,7 +97,12 @@ impl<'a> FilterParts<'a> {
     }
 
     /// Collects the parts of a filter for a law that is being calibrated, when nothing is known yet about the readings.
-    pub fn of_law(kind: EstimatorKind, law: &'a LawParams, estimator: EstimatorParams, limits: RangeParams) -> Self {
+    pub fn of_law(
+        kind: EstimatorKind,
+        law: &'a LawParams,
+        estimator: EstimatorParams,
+        limits: StrainRange<f64>,
+    ) -> Self {
         let parts = bare_parts(&estimator, limits);
         Self { kind, law, estimator, parts, options: Options::plain(), step_factor: 1.0 }
     }
@@ -117,7 +121,7 @@ impl<'a> FilterParts<'a> {
 
     /// Builds the filter, with the learned correction if there is one.
     pub fn filter(self, learned: Option<&Arc<Learned>>) -> Result<Box<dyn Filter>, SensorError> {
-        let shared = |learned: &Arc<Learned>| (learned.past_scale(), SharedCorrection(Arc::clone(&learned.filter)));
+        let shared = |learned: &Arc<Learned>| (learned.readings, SharedCorrection(Arc::clone(&learned.filter)));
         let learned = learned.map(shared);
         Ok(self.running(self.parts.with_correction(learned), None)?)
     }
@@ -246,7 +250,7 @@ fn reports<const B: usize, const N: usize>(
     Reports {
         model,
         limits: *limits,
-        settling: estimator.settling.map_or_else(unseen, SettlingParams::to_model),
+        settling: estimator.settling.unwrap_or_else(unseen),
         filtered_scale: estimator.strain_sd_scale,
         smoothed_scale: estimator.smoothed_sd_scale.unwrap_or(1.0),
         doubts: options.protections.doubts,
@@ -254,9 +258,9 @@ fn reports<const B: usize, const N: usize>(
 }
 
 /// Components around a filter of readings R/R₀ for which only the limits of the strain are known.
-fn bare_parts(estimator: &EstimatorParams, limits: RangeParams) -> LiveParts<f64, ()> {
+fn bare_parts(estimator: &EstimatorParams, limits: StrainRange<f64>) -> LiveParts<f64, ()> {
     let EstimatorParams { motion, noise, .. } = estimator;
-    let unread = Unread::new(motion.rate_time_s, motion.rate_sd_per_s, limits.to_model());
+    let unread = Unread::new(motion.rate_time_s, motion.rate_sd_per_s, limits);
     let doubt = DoubtParts {
         low: 0.0,
         high: 0.0,
@@ -275,7 +279,7 @@ fn bare_parts(estimator: &EstimatorParams, limits: RangeParams) -> LiveParts<f64
         rested: 1.0,
         dt_s: 0.0,
         longest_step_s: f64::INFINITY,
-        limits: limits.to_model(),
+        limits,
         strain_sd_scale: estimator.strain_sd_scale,
         reading_variance: noise.reading_sd * noise.reading_sd,
         known_variance: (START_SD * limits.span()).powi(2),

@@ -92,7 +92,7 @@ impl<'a> CorrectedWayBack<'a> {
     pub(crate) fn new(back: Box<dyn WayBack + 'a>, learned: &Learned, rows: Rows<'a>) -> Self {
         let correction = Arc::clone(&learned.smoother);
         let mut starts = Vec::with_capacity(rows.len() / SEGMENT + 1);
-        let mut past = Watched::new(learned.past_scale());
+        let mut past = Watched::new(learned.readings);
         for row in 0..rows.len() {
             if row % SEGMENT == 0 {
                 starts.push(past);
@@ -100,7 +100,7 @@ impl<'a> CorrectedWayBack<'a> {
             let (time_s, reading) = rows.get(row);
             past.step(time_s, CorrectionReading::plain(reading));
         }
-        Self { back, correction, rows, starts, ahead: Watched::new(learned.future_scale()) }
+        Self { back, correction, rows, starts, ahead: Watched::new(learned.readings.future()) }
     }
 
     /// Corrects a smoothed row. After the last reading, the future is taken as settled, as at the last reading.

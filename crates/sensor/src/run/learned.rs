@@ -1,16 +1,16 @@
 use std::sync::Arc;
 
 use ohmstrain_ekf::correction::{FILTER_INPUTS, FeatureScale};
+use ohmstrain_model::StrainRange;
 
 use crate::correction::{OwnedCorrection, OwnedSimulated};
 use crate::params::SensorParams;
-use crate::params::correction::{CorrectionParams, CorrectionScale, SIDES, SMOOTHER_INPUTS, TrainingRow};
-use crate::params::range::RangeParams;
+use crate::params::correction::{CorrectionParams, SIDES, SMOOTHER_INPUTS, TrainingRow};
 
 /// The learned correction of a sensor, shared by its filters and smoothers.
 #[derive(Debug)]
 pub struct Learned {
-    readings: CorrectionScale,
+    pub(crate) readings: FeatureScale<f64>,
     pub(crate) filter: Arc<OfFilter>,
     pub(crate) smoother: Arc<OfSmoother>,
 }
@@ -29,22 +29,12 @@ impl Learned {
 
     /// Prepares a correction from parameters and the limits of the strain.
     #[must_use]
-    pub fn new(params: &CorrectionParams, limits: RangeParams) -> Arc<Self> {
+    pub fn new(params: &CorrectionParams, limits: StrainRange<f64>) -> Arc<Self> {
         let of_filter: Vec<_> = params.rows.iter().map(TrainingRow::filter_inputs).collect();
         let of_smoother: Vec<_> = params.rows.iter().map(TrainingRow::smoother_inputs).collect();
         let mut filter = OfFilter::new(&params.filter, &of_filter, limits);
         filter.simulated = Some(OwnedSimulated::new(&params.simulated, &filter.scales));
         let smoother = OfSmoother::new(&params.smoother, &of_smoother, limits);
         Arc::new(Self { readings: params.readings, filter: Arc::new(filter), smoother: Arc::new(smoother) })
-    }
-
-    /// Scale of the features of the past.
-    pub(crate) fn past_scale(&self) -> FeatureScale<f64> {
-        self.readings.past()
-    }
-
-    /// Scale of the features of the future.
-    pub(crate) fn future_scale(&self) -> FeatureScale<f64> {
-        self.readings.future()
     }
 }

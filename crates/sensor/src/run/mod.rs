@@ -89,25 +89,20 @@ pub trait Smoother: Send {
     /// The row at which a step failed, and the reason.
     fn way_back<'a>(&'a mut self, rows: Rows<'a>) -> Result<Box<dyn WayBack + 'a>, (usize, StepError)>;
 
-    /// Smooths a whole recording; `None` if the estimator has no smoother.
+    /// Smooths a whole recording.
     ///
     /// # Errors
     /// The row at which a step failed, and the reason.
-    fn smooth(
-        &mut self,
-        time_s: &[f64],
-        readings: &[Option<Reading<f64>>],
-    ) -> Result<Option<Vec<Output>>, (usize, StepError)> {
+    fn smooth(&mut self, time_s: &[f64], readings: &[Option<Reading<f64>>]) -> Result<Vec<Output>, (usize, StepError)> {
         let len = time_s.len().min(readings.len());
         let row = |row: usize| (time_s[row], readings[row]);
         let mut back = self.way_back(Rows::new(len, &row))?;
-        let (mut segment, mut outputs, mut first) = (Vec::new(), Vec::with_capacity(len), len);
-        while let Some(rows) = back.next_segment(&mut segment)? {
+        let (mut segment, mut outputs) = (Vec::new(), Vec::with_capacity(len));
+        while back.next_segment(&mut segment)?.is_some() {
             outputs.extend(segment.iter().rev());
-            first = rows.start;
         }
         outputs.reverse();
-        Ok((first == 0).then_some(outputs))
+        Ok(outputs)
     }
 }
 
@@ -152,7 +147,7 @@ impl<'a> Rows<'a> {
 /// segment.
 pub trait WayBack {
     /// Smooths the last segment that has not been smoothed yet. `out` then holds its estimates in order of time. Returns
-    /// the range of its rows; `None` once the first row has been smoothed, or if the estimator has no smoother.
+    /// the range of its rows; `None` once the first row has been smoothed.
     ///
     /// # Errors
     /// The row at which a step failed, and the reason.

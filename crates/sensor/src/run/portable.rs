@@ -46,7 +46,7 @@ impl PortableFilter {
         let estimator = *params.estimator(kind)?;
         let learned = Learned::of(params).filter(|_| asked == EstimatorKind::Corrected);
         let correction = learned.map(|learned| {
-            let (features, learned) = (learned.past_scale(), learned.filter.as_ref().clone());
+            let (features, learned) = (learned.readings, learned.filter.as_ref().clone());
             PortableCorrection { features, learned }
         });
         let hypotheses = match kind {

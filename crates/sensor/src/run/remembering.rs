@@ -104,7 +104,7 @@ where
         prepared: &E::Prepared,
         reading: Option<Reading<f64>>,
         next: &E::State,
-    ) -> Result<Option<E::State>, StepError> {
+    ) -> Result<E::State, StepError> {
         self.estimator.smooth_back(filtered, prepared, reading, next)
     }
 }

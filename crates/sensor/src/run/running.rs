@@ -183,27 +183,22 @@ where
     fn emit(&mut self, count: usize, last: E::State, out: &mut dyn FnMut(Output)) -> Result<(), StepError> {
         let mut due = mem::take(&mut self.due);
         let mut back = Backward::new(last);
-        let mut smoothed = Ok(true);
-        for (place, Pending { time_s, reported, row }) in
-            self.pending.iter().enumerate().rev().take_while(|_| count > 0)
-        {
+        let mut waiting = self.pending.iter().enumerate().rev().take_while(|_| count > 0);
+        let smoothed = waiting.try_for_each(|(place, Pending { time_s, reported, row })| {
             let show = |state: &E::State| {
                 if place < count {
                     due.push(self.lagged_row(state, reported));
                 }
             };
-            smoothed = back.over(self.live.substeps(), *time_s, row, place > 0, show);
-            if smoothed != Ok(true) {
-                break;
-            }
-        }
-        if smoothed == Ok(true) {
+            back.over(self.live.substeps(), *time_s, row, place > 0, show)
+        });
+        if smoothed.is_ok() {
             due.iter().rev().for_each(|output| out(*output));
             self.pending.drain(..count);
         }
         due.clear();
         self.due = due;
-        if smoothed? { Ok(()) } else { Err(StepError::NoSmoother) }
+        smoothed
     }
 
     /// Returns the state after a row, before a second look of the filter: no backward step exists over its newly created

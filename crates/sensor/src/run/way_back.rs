@@ -101,12 +101,7 @@ where
         for (row, (measured, step)) in rows.clone().zip(&self.steps).rev() {
             let (running, time_s) = (&*self.running, self.rows.get(row).0);
             let show = |state: &E::State| out.push(running.smoothed_row(state, measured));
-            let back = self.back.over(running.live.substeps(), time_s, step, true, show);
-            if !back.map_err(|error| (row, error))? {
-                out.clear();
-                self.starts.clear();
-                return Ok(None);
-            }
+            self.back.over(running.live.substeps(), time_s, step, true, show).map_err(|error| (row, error))?;
         }
         out.reverse();
         Ok(Some(rows))

@@ -1,6 +1,6 @@
 use ohmstrain::{KNOWN_BEYOND, Known};
+use ohmstrain_model::StrainRange;
 use ohmstrain_report::Scored;
-use ohmstrain_sensor::RangeParams;
 
 use ohmstrain::trace::TraceFile;
 
@@ -19,7 +19,7 @@ pub struct KnownStrains {
 impl KnownStrains {
     /// Returns the cases: no known strain; and, if an interval in s is given, one known strain after each such interval, and
     /// the first strains near the ends of the range. All of them lie in the scored part, and within the estimator's limits.
-    pub fn cases(recording: &TraceFile, part: Scored, limits: RangeParams, every_s: Option<f64>) -> Vec<Self> {
+    pub fn cases(recording: &TraceFile, part: Scored, limits: StrainRange<f64>, every_s: Option<f64>) -> Vec<Self> {
         let mut cases = vec![Self { name: None, known: Vec::new() }];
         if let Some(every_s) = every_s {
             let reach = KNOWN_BEYOND * limits.span();

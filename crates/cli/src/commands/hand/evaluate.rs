@@ -4,7 +4,7 @@ use ohmstrain_report::{Scored, scoring};
 use std::path::Path;
 
 use ohmstrain::trace::{HandChannel, TraceFile};
-use ohmstrain::{Error, Reading, StepError};
+use ohmstrain::{Error, Reading};
 use ohmstrain_bench_data::Metadata;
 
 use super::description;
@@ -73,9 +73,8 @@ pub fn scored(mut joint: Joint, table: &Table, overrides: &Metadata, part: Score
         joint.step(time_s[row], &of_row)
     };
     let filtered: Vec<JointRow> = (0..time_s.len()).map(step).collect::<Result<_, _>>()?;
-    // Not every estimator has a smoother.
     let smoothed = match joint.smooth(&time_s, &readings.iter().map(Vec::as_slice).collect::<Vec<_>>()) {
-        Err(Error::NoFusedSmoother | Error::Step(StepError::NoSmoother)) => Vec::new(),
+        Err(Error::NoFusedSmoother) => Vec::new(),
         smoothed => smoothed?,
     };
     let score = |rows: &[JointRow], of: &dyn Fn(&JointRow) -> (f64, f64)| {

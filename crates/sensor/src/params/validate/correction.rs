@@ -1,12 +1,11 @@
 use std::ops::Range;
 
-use ohmstrain_ekf::correction::{FILTER_INPUTS, INDUCING, OUTPUTS};
+use ohmstrain_ekf::correction::{FILTER_INPUTS, FeatureScale, INDUCING, OUTPUTS};
 
 use super::table::{AMOUNT, FACTOR, FieldError, POSITIVE, SIGNED, Table, WEIGHT, check};
 use crate::correction::side_of;
 use crate::params::correction::{
-    CorrectionParams, CorrectionScale, CorrectorParams, InputScales, ProcessParams, SIDES, SMOOTHER_INPUTS,
-    SimulatedParams, TrainingRow,
+    CorrectionParams, CorrectorParams, InputScales, ProcessParams, SIDES, SMOOTHER_INPUTS, SimulatedParams, TrainingRow,
 };
 use crate::params::estimator::EstimatorKind;
 
@@ -18,7 +17,7 @@ impl CorrectionParams {
         if self.corrects == EstimatorKind::Corrected {
             return Err(table.wrong("corrects", "a filter", self.corrects.name()));
         }
-        self.readings.validate(&table.table("readings"))?;
+        table.scale("readings", &self.readings)?;
         let rows = self.rows.len();
         self.filter.validate(&table.table("filter"), FILTER_INPUTS, rows)?;
         self.smoother.validate(&table.table("smoother"), SMOOTHER_INPUTS, rows)?;
@@ -43,15 +42,16 @@ impl SimulatedParams {
     }
 }
 
-impl CorrectionScale {
-    /// Checks every number.
+impl Table {
+    /// Checks a scale of readings.
     ///
     /// # Errors
     /// Names the first number outside its range.
-    pub fn validate(&self, table: &Table) -> Result<(), FieldError> {
-        check!(table, self; centre: SIGNED, half_range: POSITIVE)?;
-        table.numbers("rates", &self.rates, POSITIVE)?;
-        table.numbers("starts", self.starts.as_flattened(), SIGNED)
+    pub fn scale(&self, name: &str, scale: &FeatureScale<f64>) -> Result<(), FieldError> {
+        let table = self.table(name);
+        check!(table, scale; centre: SIGNED, half_range: POSITIVE)?;
+        table.numbers("rates", &scale.rates, POSITIVE)?;
+        table.numbers("starts", scale.starts.as_flattened(), SIGNED)
     }
 }
 

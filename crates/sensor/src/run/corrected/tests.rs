@@ -6,24 +6,23 @@ use ohmstrain_ekf::correction::{
 };
 use ohmstrain_ekf::live::{Flags, Protections};
 use ohmstrain_ekf::{Estimate, Gaussian, Guard, Reading, ReadingVerdict, StepError};
+use ohmstrain_model::{Gauge, StrainRange};
 
 use super::{CorrectedWayBack, Learned, future_features, outputs};
 use crate::EstimatorKind;
 use crate::correction::{ONE_SIDED, ProcessKind, SMOOTHER_INPUTS};
 use crate::params::correction::ProcessParams;
 use crate::params::correction::{
-    CorrectionParams, CorrectionScale, CorrectorParams, FUTURE_FEATURES, InputScales, SimulatedParams, TrainingRow,
-    smoother_inputs,
+    CorrectionParams, CorrectorParams, FUTURE_FEATURES, InputScales, SimulatedParams, TrainingRow, smoother_inputs,
 };
 use crate::params::estimator::{EstimatorParams, MotionParams, NoiseParams, PhaseParams};
-use crate::params::law::{GaugeParams, LawParams};
-use crate::params::range::RangeParams;
+use crate::params::law::LawParams;
 use crate::run::build::FilterParts;
 use crate::run::options::Options;
 use crate::run::turns::Turns;
 use crate::run::{Filter, Output, Rows, SEGMENT, WayBack};
 
-const LIMITS: RangeParams = RangeParams { lower: 0.0, upper: 0.4 };
+const LIMITS: StrainRange<f64> = StrainRange { lower: 0.0, upper: 0.4 };
 
 /// Returns an output whose strain is a function of time, with a variance that grows with the time since the last reading.
 fn says(time_s: f64, gap: f64, verdict: ReadingVerdict) -> Output {
@@ -65,7 +64,7 @@ impl WayBack for FakeBack {
 
 /// Low-passes start a third of the way from the reading to the centre.
 const STARTS: Starts<f64> = [[0.0, 0.67]; 6];
-const SCALE: CorrectionScale = CorrectionScale { centre: 0.25, half_range: 0.3, rates: [0.02, 0.05], starts: STARTS };
+const SCALE: FeatureScale<f64> = FeatureScale { centre: 0.25, half_range: 0.3, rates: [0.02, 0.05], starts: STARTS };
 
 fn reading(time_s: f64) -> Reading<f64> {
     Reading::from(0.25 + 0.28 * (0.3 * time_s + 0.2).sin() + 0.02 * (2.1 * time_s).sin())
@@ -91,7 +90,7 @@ fn both_ways(time_s: &[f64], readings: &[Option<Reading<f64>>]) -> (Vec<Correcti
         (time_s.iter().rev().copied().collect(), readings.iter().rev().copied().collect());
     let mut future = features(&back.0, &back.1, SCALE.future());
     future.reverse();
-    (features(time_s, readings, SCALE.past()), future)
+    (features(time_s, readings, SCALE), future)
 }
 
 fn params() -> CorrectionParams {
@@ -203,7 +202,7 @@ fn segments_say_what_the_whole_recording_says() {
 /// A law without branches, and an extended Kalman filter for it.
 fn law_and_estimator() -> (LawParams, EstimatorParams) {
     let law = LawParams {
-        gauge: GaugeParams::Polynomial { coefficients: [1.4, -0.3, 0.0] },
+        gauge: Gauge::Polynomial { coefficients: [1.4, -0.3, 0.0] },
         extend_viscosity_s: 0.01,
         retract_viscosity_s: -0.01,
         branches: Vec::new(),
@@ -255,7 +254,7 @@ fn a_corrected_filter_says_what_the_bare_one_beside_it_and_its_readings_say() {
     let learned = Learned::new(&params(), LIMITS);
     let correction = Arc::clone(&learned.filter);
     let (mut bare, mut corrected) = (live(None, Some(30.0)), live(Some(&learned), Some(30.0)));
-    let mut features = ReadingFeatures::new(SCALE.past());
+    let mut features = ReadingFeatures::new(SCALE);
     let (mut last_s, mut known, mut innovations) = (0.0, None, Vec::<(f64, f64)>::new());
     let mut rejected = 0;
     for (time_s, reading) in broken_recording() {
