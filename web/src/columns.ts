@@ -10,6 +10,7 @@ export const STREAM_ROLES: [string, string][] = [
   ["resistance_ratio", "R/R₀"],
   ["adc", "converter code"],
   ["strain", "strain"],
+  ["temperature_c", "temperature, °C"],
 ];
 
 /** The cells of the last line that is all numbers, and those of the one before; nothing if there are not two. */

@@ -79,10 +79,10 @@ impl Stream {
     /// Takes a line without its end, and appends the numbers of its row to `out`.
     fn take_line(&mut self, line: &str, arrived_s: f64, out: &mut Vec<f64>) -> Result<(), String> {
         match self.lines.take(line, arrived_s) {
-            Ok(Line::Row(row)) => self.take_row(&row, out),
+            Ok(Line::Row(row)) => self.take_row(row, out),
             Ok(Line::Restarted(row)) => {
                 self.restart()?;
-                self.take_row(&row, out)
+                self.take_row(row, out)
             }
             Ok(Line::Header) => self.headed(),
             Ok(_) => Ok(()),
@@ -104,21 +104,28 @@ impl Stream {
             ));
         }
         self.message.clear();
-        if self.counts.rows > 0 { self.restart() } else { Ok(()) }
+        if self.counts.rows > 0 { self.restart() } else { self.begin() }
+    }
+
+    /// Starts a new filter.
+    fn begin(&mut self) -> Result<(), String> {
+        let has_temperature = self.lines.parser.has_temperature();
+        let remark = self.filter.begin(self.sensor.filter(), has_temperature).map_err(|error| error.to_string())?;
+        remark.into_iter().for_each(|remark| self.message = remark.into());
+        Ok(())
     }
 
     /// Restarts everything that depends on time, after the clock has restarted.
     fn restart(&mut self) -> Result<(), String> {
         self.counts.restarts += 1;
-        self.filter.begin(self.sensor.filter()).map_err(|error| error.to_string())?;
+        self.begin()?;
         self.recent.clear();
         self.message = "the clock has started again, and so has the filter".into();
         Ok(())
     }
 
-    fn take_row(&mut self, row: &Row, out: &mut Vec<f64>) -> Result<(), String> {
-        let value = row.reading.value;
-        let estimate = match self.filter.step(row) {
+    fn take_row(&mut self, mut row: Row, out: &mut Vec<f64>) -> Result<(), String> {
+        let estimate = match self.filter.step(&mut row) {
             Ok(estimate) => estimate,
             Err(error) => {
                 self.counts.bad_lines += 1;
@@ -126,6 +133,7 @@ impl Stream {
                 return Ok(());
             }
         };
+        let value = row.reading.value;
         self.counts.rows += 1;
         self.counts.missing += u64::from(!value.is_finite());
         self.recent.push_back((row.time_s, value));
@@ -137,7 +145,7 @@ impl Stream {
         if let Some(remark) = self.filter.remark(&estimate, "say so").map_err(|error| error.to_string())? {
             self.message = remark;
         }
-        self.record_row(row).map_err(|error| error.to_string())?;
+        self.record_row(&row).map_err(|error| error.to_string())?;
         out.extend([row.time_s, value, estimate.strain, estimate.strain_sd]);
         Ok(())
     }
@@ -160,7 +168,7 @@ impl Stream {
 #[wasm_bindgen]
 impl Stream {
     /// Takes complete lines that have arrived at a time, s, on this computer's clock. Returns four numbers per row: time in s,
-    /// reading, strain and its standard deviation.
+    /// reading at the temperature of the calibration, strain and its standard deviation.
     pub fn take(&mut self, text: &str, arrived_s: f64) -> Result<Vec<f64>, JsError> {
         let mut out = Vec::with_capacity(WIDTH * text.len() / 8);
         for line in text.lines() {

@@ -4,7 +4,7 @@ use std::io;
 
 use ohmstrain::number::{median, significant};
 use ohmstrain::trace::{self, WatchedFilter, check_unit};
-use ohmstrain::{Error, Estimate, FilterBuilder, Sensor, Thermometer};
+use ohmstrain::{Error, Estimate, FilterBuilder, Sensor};
 use ohmstrain_bench_data::{Headed, Line, LineParser, Row};
 
 use super::Shown;
@@ -36,11 +36,7 @@ impl Timed for Point {
 pub struct Session<'a> {
     pub args: &'a LiveArgs,
     /// The sensor, on the joint of the last header that named one.
-    calibrated: Sensor,
-    /// The same for the stream's columns.
     sensor: Sensor,
-    /// Conversion of the readings to its reference temperature.
-    thermometer: Thermometer,
     lines: LineParser,
     filter: WatchedFilter,
     headed: Headed,
@@ -65,8 +61,6 @@ impl<'a> Session<'a> {
         let lines = LineParser::new(&name, args.setup.metadata(&args.estimate.units));
         let mut session = Self {
             args,
-            calibrated: sensor.clone(),
-            thermometer: Thermometer::new(&sensor),
             sensor,
             lines,
             filter,
@@ -95,23 +89,18 @@ impl<'a> Session<'a> {
         let header = self.args.port.source();
         kind.map_or(Ok(()), |kind| check_unit(&header, kind, self.sensor.params().reading))?;
         if let Some(joint) = trace::joint(&self.lines.metadata()) {
-            self.calibrated = self.calibrated.clone().on_joint(joint)?;
+            self.sensor = self.sensor.clone().on_joint(joint)?;
         }
         // Messages about the lines above it no longer apply.
         self.track.message.clear();
-        self.sensor = self.calibrated.clone();
-        if self.sensor.params().temperature.is_some() && !self.lines.has_temperature() {
-            self.track.message = "no column temperature_c: intervals are wider".into();
-            self.sensor = self.calibrated.clone().without_temperature();
-        }
-        self.thermometer = Thermometer::new(&self.sensor);
         if self.track.pulse.counts.rows > 0 { self.restart() } else { Ok(self.begin()?) }
     }
 
     /// Starts a new filter.
     fn begin(&mut self) -> Result<(), Error> {
         let wanted = wanted(self.args, &self.sensor, &self.track);
-        self.filter.begin(wanted)?;
+        let remark = self.filter.begin(wanted, self.lines.has_temperature())?;
+        remark.into_iter().for_each(|remark| self.track.message = remark.into());
         self.track.pulse.restart();
         Ok(())
     }
@@ -155,8 +144,7 @@ impl Taker for Session<'_> {
             self.restart()?;
         }
         let mut row = due.row;
-        row.reading.value = self.thermometer.at_reference(row.reading.value, row.temperature_c);
-        let estimate = match self.filter.step(&row) {
+        let estimate = match self.filter.step(&mut row) {
             Ok(estimate) => estimate,
             Err(error) => {
                 self.track.skip(error.to_string());
