@@ -54,7 +54,7 @@ WAYS = {"filter": ["filter"], "exported C": ["export"], "smoother": ["smooth"], 
 
 
 def cases():
-    """Named before any was run; nothing was chosen by their results."""
+    """Named before any was run; the page says what was chosen on them."""
 
     def of(name, *words, **more):
         return Case(name, list(words), **more)

@@ -1,7 +1,6 @@
-use crate::order::{self, sorted};
+use crate::order::{self, extent, sorted};
 use crate::samples::central_rate;
 use crate::samples::{Samples, filled_strain};
-use ohmstrain_model::StrainRange;
 
 /// Statistics of the strain's motion in the recordings.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,6 +24,8 @@ pub(crate) struct MotionStats {
     /// 99th percentile of the speed.
     pub fastest_rate: f64,
     pub longest_s: f64,
+    /// Number of full strokes in all recordings.
+    pub strokes: f64,
     /// Total distances of all stretching and of all releasing movements.
     pub distances: [f64; 2],
 }
@@ -44,9 +45,13 @@ impl MotionStats {
             times.push(correlation_time(samples.time_s, &rate));
             phases.add(samples.time_s, &rate);
             rates.extend(rate);
-            strains.extend(strain);
+            strains.push(strain);
             longest_s = longest_s.max(samples.time_s[samples.len() - 1] - samples.time_s[0]);
         }
+        let (low, high) = extent(strains.iter().flatten().copied());
+        let made = |strain: &Vec<f64>| strokes(strain, high - low).last().copied();
+        let strokes = strains.iter().filter_map(made).sum();
+        let strains = strains.concat();
         let strain_mean = mean(&strains);
         let deviations: Vec<f64> = strains.iter().map(|x| x - strain_mean).collect();
         let speeds = sorted(rates.iter().map(|v| v.abs()));
@@ -63,15 +68,26 @@ impl MotionStats {
             longest_hold_s: phases.holds.iter().copied().fold(0.0, f64::max),
             fastest_rate: speeds[(speeds.len() - 1) * 99 / 100],
             longest_s,
+            strokes,
             distances: phases.distances,
         }
     }
+}
 
-    /// Returns the number of strokes: the distance of all movements over this range.
-    pub(crate) fn strokes(&self, range: StrainRange<f64>) -> f64 {
-        let [stretched, released] = self.distances;
-        (stretched + released) / range.span().max(f64::MIN_POSITIVE)
-    }
+/// Smallest movement that counts, as a fraction of a full stroke: references are noisy.
+const LEAST_STROKE: f64 = 0.1;
+
+/// Returns the path length from the first row to each, in full strokes of this span; movements below a tenth of a stroke do not count.
+pub(crate) fn strokes(strain: &[f64], span: f64) -> Vec<f64> {
+    let (mut way, mut place) = (0.0, strain.first().copied().unwrap_or(0.0));
+    let to = |x: &f64| {
+        let moved = (x - place).abs() / span;
+        if moved > LEAST_STROKE {
+            (way, place) = (way + moved, *x);
+        }
+        way
+    };
+    strain.iter().map(to).collect()
 }
 
 /// Fraction of time at rest below which a body only turns around: a sine's rate is below [`REST_SHARE`] of its fast ones for (2/π)
@@ -182,5 +198,15 @@ mod tests {
         let ramps = |t: f64| 0.3 * ((t % 30.0) / 5.0).min(1.0).min((20.0 - t % 30.0) / 5.0).max(0.0);
         let held = hold_s(ramps).unwrap();
         assert!((held - 10.0).abs() < 0.5, "{held} s");
+    }
+
+    /// Tests one extension in 5 s, held for 95 s with a noisy reference, 100 rows a second: a path in steps of a tenth loses a tenth at most.
+    #[test]
+    fn noise_of_the_reference_makes_no_strokes() {
+        let time_s: Vec<f64> = (0..10_000).map(|k| 0.01 * f64::from(k)).collect();
+        let noise = |k: usize| 0.004 * ((0.754_877_666 * k as f64).fract() - 0.5);
+        let strain: Vec<f64> = time_s.iter().enumerate().map(|(k, t)| 0.06 * t.min(5.0) + noise(k)).collect();
+        let made = MotionStats::new(&[Samples::new(&time_s, &strain, &strain).unwrap()]).strokes;
+        assert!((0.9..=1.0).contains(&made), "{made}");
     }
 }

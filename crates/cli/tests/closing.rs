@@ -3,6 +3,23 @@
 use crate::common::{Bench, CALIBRATED_UNTIL, SIMULATE, change_rows, first_rows};
 use serde_json::Value;
 
+/// A recording that only extends counts as one stroke. Without the factor, the deviation that covers 95 % of the held-out rows is at most
+/// √20/1.96 = 2.28 times their RMSE: 5 % of the rows have that error or a larger one.
+#[test]
+fn intervals_of_a_single_extension_are_wide() {
+    let bench = Bench::new();
+    let steps = ["--protocol", "load-steps", "--speed-mm-s", "2", "--sample-rate-hz", "5"];
+    bench.run(&[&["simulate", "-o", "steps.csv"], &steps[..]].concat()).ok();
+    // The first half, which ends in a hold.
+    bench.write("first.csv", &first_rows(&bench.read("steps.csv"), 585));
+    let calibrate = ["calibrate", "first.csv", "--estimator", "ekf", "--branches", "1", "-o", "sensor.toml", "--json"];
+    let closing: Value = serde_json::from_str(&bench.run(&calibrate).ok()).unwrap();
+    let rmse = closing["left_out"]["filter"]["rmse"].as_f64().unwrap();
+    let sensor: toml::Table = toml::from_str(&bench.read("sensor.toml")).unwrap();
+    let widened = sensor["unstated"]["filter_sd"].as_float().unwrap();
+    assert!(widened > 20_f64.sqrt() / 1.96 * rmse, "{widened} {rmse}");
+}
+
 /// The summary has at most ten lines, none wider than a terminal, with every heading.
 #[test]
 fn a_calibration_ends_in_ten_lines() {

@@ -10,7 +10,7 @@ use crate::calibrate::correction_fit::fit_correction;
 use crate::calibrate::error_budget::{Direction, WrongDirection, error_budget};
 use crate::calibrate::left_out::relative_changes;
 use crate::calibrate::scores::{ScoredRow, score_of_full_scale};
-use crate::calibrate::unstated::{times_of_strokes, unstated};
+use crate::calibrate::unstated::{error_factor, unstated};
 use crate::law::fit::CrossFit;
 use crate::law::identifiability::Identifiability;
 use crate::law::structure::LawFit;
@@ -49,7 +49,7 @@ pub(crate) fn seen(recordings: &[Samples], range: StrainRange<f64>, stats: &Moti
 /// Inputs of the scores on held-out quarters.
 pub(crate) struct Check<'a> {
     pub recordings: &'a [Samples<'a>],
-    /// Number of strokes in them, see [`MotionStats::strokes`].
+    /// Number of full strokes in them.
     pub strokes: f64,
     pub fit: &'a CrossFit,
     pub kind: EstimatorKind,
@@ -128,21 +128,21 @@ pub(crate) struct Checked {
     pub rows: Vec<LeftOutRow>,
 }
 
-/// Returns the unstated errors of the estimators in these quarters, with errors `times` as large.
-fn unstated_in<'b>(blocks: impl Iterator<Item = &'b Scored>, times: f64) -> Unstated {
+/// Returns the unstated errors of the estimators in these quarters, with errors multiplied by `factor`.
+fn unstated_in<'b>(blocks: impl Iterator<Item = &'b Scored>, factor: f64) -> Unstated {
     let (mut filter, mut smoother) = (Vec::new(), Vec::new());
     for block in blocks {
         filter.extend_from_slice(&block.filter);
         smoother.extend_from_slice(&block.smoother);
     }
-    unstated(&filter, &smoother, times)
+    unstated(&filter, &smoother, factor)
 }
 
 /// Returns all rows. Those of each quarter include the unstated errors of the other quarters, so that its coverage is that of held-out
 /// data.
-fn widened(mut blocks: Vec<Scored>, times: f64) -> Scored {
+fn widened(mut blocks: Vec<Scored>, factor: f64) -> Scored {
     let others = |block: usize| blocks.iter().enumerate().filter(move |(k, _)| *k != block).map(|(_, scored)| scored);
-    let unstated: Vec<Unstated> = (0..blocks.len()).map(|block| unstated_in(others(block), times)).collect();
+    let unstated: Vec<Unstated> = (0..blocks.len()).map(|block| unstated_in(others(block), factor)).collect();
     let mut scored = Scored::default();
     for (block, unstated) in blocks.iter_mut().zip(unstated) {
         block.widen(unstated);
@@ -155,9 +155,9 @@ impl Check<'_> {
     /// Scores every quarter with the fit to the others; `None` if they cannot be estimated.
     pub(crate) fn checked(&self, seen: RecordingSummary, identifiability: &Option<Identifiability>) -> Option<Checked> {
         let blocks = self.blocks().ok()?;
-        let times = times_of_strokes(self.strokes);
-        let unstated = unstated_in(blocks.iter(), times);
-        let scored = widened(blocks, times);
+        let factor = error_factor(self.strokes);
+        let unstated = unstated_in(blocks.iter(), factor);
+        let scored = widened(blocks, factor);
         let findings = Findings {
             filter: score_of_full_scale(&scored.filter)?,
             smoother: score_of_full_scale(&scored.smoother),

@@ -205,9 +205,16 @@ fn calibrate_arranged(
     (steps.progress)(Stage::LeftOut);
     let identifiability = identifiability(recordings, &fit.law.law).ok();
     let seen = seen(recordings, limits, &stats);
-    let strokes = stats.strokes(limits);
-    let checked = Check { recordings, strokes, fit, kind: default_estimator, filter, estimators: &estimators, of_make }
-        .checked(seen, &identifiability);
+    let checked = Check {
+        recordings,
+        strokes: stats.strokes,
+        fit,
+        kind: default_estimator,
+        filter,
+        estimators: &estimators,
+        of_make,
+    }
+    .checked(seen, &identifiability);
     let (unstated, findings, left_out) = checked.map_or_else(Default::default, |checked| {
         let Checked { findings, unstated, rows } = checked;
         (unstated, Some(findings), rows)

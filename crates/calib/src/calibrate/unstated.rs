@@ -11,25 +11,23 @@ use crate::sd_scale::Z_95;
 const LEVEL: f64 = 0.95;
 
 /// Returns the least standard deviation that, added in quadrature to those of filter and smoother, makes their 95 % intervals cover 95 % of
-/// the rows, if errors were `times` as large. Rows without a true strain are skipped.
+/// the rows, with errors multiplied by `factor`. Rows without a true strain are skipped.
 #[must_use]
-pub fn unstated(filter: &[ScoredRow], smoother: &[ScoredRow], times: f64) -> Unstated {
-    Unstated { filter_sd: unstated_sd(filter, times), smoother_sd: unstated_sd(smoother, times) }
+pub fn unstated(filter: &[ScoredRow], smoother: &[ScoredRow], factor: f64) -> Unstated {
+    Unstated { filter_sd: unstated_sd(filter, factor), smoother_sd: unstated_sd(smoother, factor) }
 }
 
-/// Returns the factor on the errors of so many strokes over the whole range: the half-width of the 95 % interval of Student's t over that
-/// of a normal distribution.
-///
-/// Errors within a stroke are alike, so that n strokes, and the n - 1 turns between them, are 2n - 1 draws (Student, *Biometrika* 6 (1908)
-/// 1). A recording that never goes back is one.
-pub(crate) fn times_of_strokes(strokes: f64) -> f64 {
+/// Returns the factor on errors of held-out quarters for a number of strokes: the 97.5 % quantile of Student's t with 2n - 1 degrees of
+/// freedom over that of a normal distribution. Errors within a stroke are correlated: n strokes and the n - 1 turns between them count as
+/// 2n - 1 draws (Student, *Biometrika* 6 (1908) 1).
+pub(crate) fn error_factor(strokes: f64) -> f64 {
     let freedom = (2.0 * strokes - 1.0).max(1.0);
     StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |t| t.inverse_cdf(0.5 + 0.5 * LEVEL) / Z_95)
 }
 
-fn unstated_sd(rows: &[ScoredRow], times: f64) -> f64 {
+fn unstated_sd(rows: &[ScoredRow], factor: f64) -> f64 {
     let lacks = |row: &ScoredRow| {
-        let needed = times * (row.strain - row.truth) / Z_95;
+        let needed = factor * (row.strain - row.truth) / Z_95;
         row.sd.map(|sd| needed * needed - sd * sd).filter(|lacks| lacks.is_finite())
     };
     let lacking = sorted(rows.iter().filter_map(lacks));
@@ -48,7 +46,7 @@ impl ScoredRow {
 
 #[cfg(test)]
 mod tests {
-    use super::{ScoredRow, times_of_strokes, unstated};
+    use super::{ScoredRow, error_factor, unstated};
 
     /// Nineteen of twenty errors lie within 1.96 deviations of 0.05 and 0.12 combined, one far beyond.
     #[test]
@@ -70,7 +68,7 @@ mod tests {
     #[test]
     fn few_strokes_count_as_students_t() {
         for (strokes, t) in [(0.2, 12.706), (1.0, 12.706), (2.0, 3.182), (3.0, 2.571), (60.5, 1.980)] {
-            let half_width = times_of_strokes(strokes) * 1.959_964;
+            let half_width = error_factor(strokes) * 1.959_964;
             assert!((half_width - t).abs() < 6e-4, "{strokes}: {half_width}");
         }
     }

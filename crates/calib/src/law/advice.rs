@@ -48,7 +48,7 @@ pub(crate) fn advice(
     let is_fast = on_bound.iter().any(|on| on.bound == Bound::Lower);
     let reasons = [
         both_directions(stats, stroke_s),
-        enough_strokes(stats, range, stroke_s),
+        enough_strokes(stats, stroke_s),
         near_zero(range),
         slow.and_then(|tau_s| long_holds(tau_s, stats)),
         is_one_speed(parameters, stats, jacobian).then(|| another_speed(stroke_s)),
@@ -69,8 +69,8 @@ fn both_directions(stats: &MotionStats, stroke_s: f64) -> Option<String> {
 }
 
 /// Advises more strokes if a block that is left out to test a law would not contain a motion.
-fn enough_strokes(stats: &MotionStats, range: StrainRange<f64>, stroke_s: f64) -> Option<String> {
-    if stats.strokes(range) < FEWEST_STROKES {
+fn enough_strokes(stats: &MotionStats, stroke_s: f64) -> Option<String> {
+    if stats.strokes < FEWEST_STROKES {
         let [stroke, all] = [stroke_s, 2.0 * FEWEST_STROKES * stroke_s].map(duration);
         let times = 2.0 * FEWEST_STROKES;
         return Some(format!(
@@ -206,6 +206,7 @@ mod tests {
             longest_hold_s: hold_s,
             fastest_rate: 0.1,
             longest_s: 12_345.0,
+            strokes: 20.0,
             distances: [3.0, 3.0],
         }
     }
@@ -234,10 +235,10 @@ mod tests {
         assert_eq!(one_way, "release as often as you stretch: back to the smallest strain, in 3.0 s a stroke");
         assert!(both_directions(&with([0.0, 0.6], 20.0), 3.0).unwrap().starts_with("stretch as often as you release"));
         assert_eq!(both_directions(&with([0.6, 0.5], 20.0), 3.0), None);
-        let few = enough_strokes(&with([0.6, 0.6], 20.0), RANGE, 3.0).unwrap();
+        let few = enough_strokes(&MotionStats { strokes: 4.0, ..stats(0.0) }, 3.0).unwrap();
         assert_eq!(few, "go to and fro over the whole range 12 times, in 3.0 s a stroke: 36 s in all");
-        let short = enough_strokes(&with([3.0, 3.0], 20.0), RANGE, 3.0).unwrap();
+        let short = enough_strokes(&with([3.0, 3.0], 20.0), 3.0).unwrap();
         assert_eq!(short, "go on with the same motion for 2 min; the longest recording has 20 s");
-        assert_eq!(enough_strokes(&with([3.0, 3.0], 200.0), RANGE, 3.0), None);
+        assert_eq!(enough_strokes(&with([3.0, 3.0], 200.0), 3.0), None);
     }
 }

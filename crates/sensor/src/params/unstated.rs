@@ -1,7 +1,7 @@
 use serde::{Deserialize, Serialize};
 
 /// Errors beyond those that the estimators state: standard deviations of the strain that widen their intervals, so that 95 %
-/// intervals cover 95 % of the rows to which the calibration was not fitted.
+/// intervals cover 95 % of the rows to which the calibration was not fitted; errors of few strokes count for more.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Unstated {

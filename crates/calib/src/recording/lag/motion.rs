@@ -1,5 +1,6 @@
 use nalgebra::{SMatrix, SVector};
 
+use crate::motion_stats::strokes;
 use crate::order::{extent, mean};
 use crate::samples::usual_step_s;
 
@@ -11,8 +12,6 @@ const MOST_MOTION_ROWS: f64 = 20_000.0;
 const MOST_READINGS: f64 = 1500.0;
 /// Longest window of the high-pass, as a fraction of the recording.
 const SLOW_SHARE: f64 = 1.0 / 6.0;
-/// Least movement that adds to the path, as a fraction of the range.
-const LEAST_STROKE: f64 = 0.1;
 /// Least number of rows for a regression.
 const FEWEST: usize = 40;
 /// Number of blocks of consecutive rows that are left out in turn.
@@ -54,7 +53,7 @@ impl ReferenceRegressors {
         let scaled: Vec<f64> = grid.iter().map(|value| 2.0 * (value - low) / (high - low) - 1.0).collect();
         let mut rows = regressors(&scaled, step_s, stretch_s);
         take_out_slow(&mut rows, (slow_s / step_s) as usize);
-        Some(Self { start_s, step_s, rows, strokes: strokes(&scaled), stretch_s, slow_s })
+        Some(Self { start_s, step_s, rows, strokes: strokes(&scaled, 2.0), stretch_s, slow_s })
     }
 
     pub(super) fn span(&self) -> (f64, f64) {
@@ -82,19 +81,6 @@ impl ReferenceRegressors {
         let row = place as usize;
         Some(self.rows[row] * (1.0 - share) + self.rows[row + 1] * share)
     }
-}
-
-/// Returns the path length from the first row to each, in full strokes; movements below a tenth of a stroke do not count.
-fn strokes(scaled: &[f64]) -> Vec<f64> {
-    let (mut way, mut place) = (0.0, scaled.first().copied().unwrap_or(0.0));
-    let to = |x: &f64| {
-        let moved = 0.5 * (x - place).abs();
-        if moved > LEAST_STROKE {
-            (way, place) = (way + moved, *x);
-        }
-        way
-    };
-    scaled.iter().map(to).collect()
 }
 
 /// Returns powers of the reference, and its movements through two low-passes each, with and without their sign.
