@@ -102,7 +102,9 @@ class Session implements Listener {
   private isTaking = false;
   private raw: string[] = [];
   private isHeaded = false;
+  /** Name of the record that is being written, and how many parts it has. */
   private record: string | undefined;
+  private parts = 1;
   private saving: Promise<void> = Promise.resolve();
 
   constructor(private readonly current: SensorState) {
@@ -147,7 +149,7 @@ class Session implements Listener {
         this.view.take(rows, summary, this.raw);
         if (summary.columns.length > 0) this.isHeaded = true;
         if (!this.isHeaded && summary.counts.badLines >= LINES_WITHOUT) this.askColumns();
-        if (this.record && recorded !== "") this.keep(this.record, recorded);
+        if (this.record) this.keepAll(this.record, recorded);
         if (this.view.isCalm) await new Promise((wake) => setTimeout(wake, CALM_MS));
       }
     } catch (error) {
@@ -196,10 +198,26 @@ class Session implements Listener {
     }
     const summary: StreamSummary = await this.current.engine.call("streamSummary");
     if (summary.columns.length === 0) return;
-    const name = `live-${new Date().toISOString().slice(0, 19).replaceAll(":", "-")}.csv`;
+    const name = `live-${new Date().toISOString().slice(0, 23).replaceAll(/[:.]/g, "-")}.csv`;
+    this.parts = 1;
     this.keep(name, `${summary.metadata}${summary.columns.join(",")}\n`);
     this.record = name;
     this.view.recording(name);
+  }
+
+  /** Stores rows of a record; the second text and later ones are records of their own, after a restart of the clock or another header. */
+  private keepAll(record: string, [rows, ...others]: string[]): void {
+    if (rows) this.keep(record, rows);
+    for (const other of others) {
+      const earlier = this.record ?? record;
+      this.parts += 1;
+      this.record = record.replace(/(-part\d+)?\.csv$/, `-part${this.parts}.csv`);
+      // The list shows the earlier record, which is complete now.
+      this.saving = this.saving.then(showRecords);
+      this.keep(this.record, other);
+      this.view.recording(this.record);
+      this.view.status(`another clock or header: recording to ${this.record}; ${earlier} is kept`);
+    }
   }
 
   /** Stores rows, one piece after the other. */

@@ -97,13 +97,41 @@ test("a board comes back, restarts, is at rest, and is zeroed", async () => {
   await page.locator("#rest").click();
   await page.getByText("the strain is zero now").waitFor();
   await page.locator("#zero").click();
-  await page.getByText(/R0 is [\d.]+ now, the median of \d+ readings/).waitFor();
+  await page.getByText(/R0 is [\d.]+ now, the median of \d+ readings; it starts again at zero/).waitFor();
   await tell(page, "unplug");
   await page.getByText("no more comes").waitFor();
   await tell(page, "plug");
   await page.getByText("reading USB 2341:0043").waitFor();
   await send(page, `time_s,resistance_ohm\n${all.slice(0, 20).join("\n")}\n`);
   await page.getByText("1 restarts").waitFor();
+});
+
+test("a record begins anew after another header or with another clock, and the earlier ones are kept", async () => {
+  const page = await connected();
+  const all = boardLines();
+  const counts = () => page.locator("#live-result .hint").nth(1).textContent();
+  await send(page, `time_s,resistance_ohm\n${all.slice(0, 50).join("\n")}\n`);
+  await expect.poll(counts).toContain("50 rows");
+  await page.locator("#record").click();
+  await page.getByText("Stop recording").waitFor();
+  const warm = (rows: string[]) => rows.map((row) => `${row},31.5`);
+  const header = "time_s,resistance_ohm,temperature_c";
+  // The end of one record and the beginning of the next come in one piece.
+  await send(page, `${all.slice(50, 60).join("\n")}\n${header}\n${warm(all.slice(20, 40)).join("\n")}\n`);
+  await page.getByText(/another clock or header: recording to live-.*-part2\.csv; live-.*\.csv is kept/).waitFor();
+  // The third row of an earlier time says that the clock has begun anew.
+  await send(page, `${warm(all.slice(0, 10)).join("\n")}\n`);
+  await page.getByText(/recording to live-.*-part3\.csv; live-.*-part2\.csv is kept/).waitFor();
+  await expect.poll(counts).toContain("88 rows");
+  await page.locator("#record").click();
+  const record = async (name: RegExp) => {
+    const text = (await download(page, () => page.getByLabel(name).click())).toString().trim();
+    return text.split("\n").filter((line) => !line.startsWith("#"));
+  };
+  const numbers = (rows: string[]) => rows.map((line) => line.split(",").map((cell) => String(Number(cell))).join(","));
+  expect(await record(/^Download live-[^p]*\.csv$/)).toEqual(["time_s,resistance_ohm", ...numbers(all.slice(50, 60))]);
+  expect(await record(/^Download .*-part2\.csv$/)).toEqual([header, ...numbers(warm(all.slice(20, 40)))]);
+  expect(await record(/^Download .*-part3\.csv$/)).toEqual([header, ...numbers(warm(all.slice(2, 10)))]);
 });
 
 test("a stream without a header is asked about", async () => {

@@ -105,22 +105,25 @@ impl LineParser {
         self.stream.as_ref().and_then(|stream| stream.parser.reference_quantity())
     }
 
-    /// Returns the names of the columns in which rows since the last header are recorded: that of the reading, and that of the reference,
-    /// if there is one; none before the header.
+    /// Returns the names of the columns in which rows since the last header are recorded: that of the reading, and those of the reference
+    /// and the temperature, if there are any; none before the header.
     pub fn recorded_columns(&self) -> impl Iterator<Item = &'static str> + use<> {
         let reading = self.stream.as_ref().map(|stream| stream.columns.reading.column);
         let reference = self.reference_quantity().map(|quantity| match quantity {
             ReferenceQuantity::Strain => Column::Strain,
             ReferenceQuantity::AngleDeg => Column::AngleDeg,
         });
-        reading.into_iter().chain(reference).map(Column::name)
+        let temperature = self.has_temperature().then_some(Column::TemperatureC);
+        reading.into_iter().chain(reference).chain(temperature).map(Column::name)
     }
 
-    /// Returns the numbers of a row in these columns: the reading, as a code if it is one, and the reference.
+    /// Returns the numbers of a row in these columns: the reading, as a code if it is one, the reference and the temperature.
     pub fn recorded(&self, row: &Row) -> impl Iterator<Item = f64> + use<> {
         let code = row.reading.code.map_or(f64::NAN, f64::from);
         let reading = if self.has_codes() { code } else { row.reading.value };
-        std::iter::once(reading).chain(self.reference_quantity().map(|_| row.reference))
+        let reference = self.reference_quantity().map(|_| row.reference);
+        let temperature_c = self.has_temperature().then_some(row.temperature_c);
+        std::iter::once(reading).chain(reference).chain(temperature_c)
     }
 
     /// Returns the time of the last row, as in the source.
@@ -240,6 +243,26 @@ mod tests {
         assert_eq!(times(&lines), [None, Some(90.0), None, None, None, None, Some(91.0)]);
         let lines = ["time_s,resistance_ohm", "90,1600", "time_us,resistance_ohm", "5000000,1600"];
         assert_eq!(times(&lines), [None, Some(90.0), None, Some(5.0)]);
+    }
+
+    /// A record has the cells as they came: codes rather than ohms, temperatures rather than their effect.
+    #[test]
+    fn a_row_is_recorded_with_its_temperature() {
+        let mut parser = LineParser::new("-", Metadata::default());
+        let code = "# front_end = divider reference_ohm=10000 side=low bits=12 noise_codes=0.5";
+        for line in [code, "temperature_c,time_us,note,adc,strain"] {
+            assert!(parser.take(line.as_bytes()).is_ok());
+        }
+        let columns: Vec<&str> = parser.recorded_columns().collect();
+        assert_eq!(columns, ["adc", "strain", "temperature_c"]);
+        let mut recorded = |line: &str| match parser.take(line.as_bytes()) {
+            Ok(Line::Row(row)) => parser.recorded(&row).map(|number| number.to_string()).collect::<Vec<_>>(),
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(recorded("31.5,5000,x,512,0.25"), ["512", "0.25", "31.5"]);
+        assert_eq!(recorded(",6000,x,,0.25"), ["NaN", "0.25", "NaN"]);
+        assert!(parser.take(b"time_s,resistance_ohm").is_ok());
+        assert_eq!(parser.recorded_columns().collect::<Vec<_>>(), ["resistance_ohm"]);
     }
 
     #[test]

@@ -11,7 +11,7 @@ fn intervals_of_a_single_extension_are_wide() {
     let steps = ["--protocol", "load-steps", "--speed-mm-s", "2", "--sample-rate-hz", "5"];
     bench.run(&[&["simulate", "-o", "steps.csv"], &steps[..]].concat()).ok();
     // The first half, which ends in a hold.
-    bench.write("first.csv", &first_rows(&bench.read("steps.csv"), 585));
+    bench.write("first.csv", first_rows(&bench.read("steps.csv"), 585));
     let calibrate = ["calibrate", "first.csv", "--estimator", "ekf", "--branches", "1", "-o", "sensor.toml", "--json"];
     let closing: Value = serde_json::from_str(&bench.run(&calibrate).ok()).unwrap();
     let rmse = closing["left_out"]["filter"]["rmse"].as_f64().unwrap();

@@ -181,6 +181,38 @@ fn a_recording_is_played_back_recorded_marked_and_zeroed() {
     assert!(made_by.len() == 1 && made_by[0].ends_with(" live"), "{made_by:?}");
 }
 
+/// A record has the readings and the temperatures as they came, not converted; after another header it begins anew.
+#[test]
+fn a_record_has_temperatures_and_begins_anew() {
+    let bench = Bench::calibrated();
+    let effect = "reference_c = 25.0\nlower_c = 10.0\nupper_c = 40.0\nrest_per_k = 0.003\nrest_per_k_sd = 0.0\n\
+                  gain_per_k = 0.0\ngain_per_k_sd = 0.0\n";
+    bench.write("warm.toml", format!("{}\n[temperature]\n{effect}", bench.read("sensor.toml")));
+    let port_path = bench.path("port");
+    let mut port = Port::plug_in(&port_path);
+    let arguments = ["live", "--port", "port", "--sensor", "warm.toml"];
+    let mut terminal = Terminal::new(&bench, cargo_bin!("ohmstrain"), &arguments);
+    terminal.wait_for("connected");
+    port.send("time_s,resistance_ohm,temperature_c\n0.2,1600,31.5\n");
+    // Hotter by 6.5 K, R0 is larger by 1.95 %: the reading counts as 1600 / 1.0195 ohms.
+    terminal.wait_for("1569");
+    terminal.press("r");
+    terminal.wait_for("recording to live-1.csv");
+    port.send("0.4,1601,31.5\n0.6,1602,\n");
+    terminal.wait_for("3 at 5.0/s");
+    port.send("time_s,resistance_ohm\n0.2,1603\n");
+    terminal.wait_for("recording to live-2.csv");
+    terminal.wait_for("1603");
+    terminal.press("r");
+    terminal.wait_for("recorded live-2.csv (1 row)");
+    terminal.quit();
+    let rows = |name: &str| -> Vec<String> {
+        bench.read(name).lines().filter(|line| !line.starts_with('#')).map(str::to_owned).collect()
+    };
+    assert_eq!(rows("live-1.csv"), ["time_s,resistance_ohm,temperature_c,mark", "0.4,1601,31.5,", "0.6,1602,,"]);
+    assert_eq!(rows("live-2.csv"), ["time_s,resistance_ohm,mark", "0.2,1603,"]);
+}
+
 /// Two joints of one sensor, on a port that is joined within a line: each number is that of `filter`.
 #[test]
 fn a_hand_is_shown_recorded_and_zeroed() {

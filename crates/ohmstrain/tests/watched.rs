@@ -3,7 +3,7 @@
 use ohmstrain::trace::WatchedFilter;
 use ohmstrain::{Estimate, Flags, Known, Sensor, TemperatureParams};
 use ohmstrain_bench_data::simulate::{Chamber, Material, Protocol, SimulationSettings, simulate};
-use ohmstrain_bench_data::{Line, LineParser, Metadata, Reading, Row};
+use ohmstrain_bench_data::{Line, LineParser, Metadata, Reading, Row, Trace};
 
 fn sensor() -> Sensor {
     Sensor::from_toml(include_str!("../examples/sensor.toml")).unwrap()
@@ -18,7 +18,7 @@ fn row(time_s: f64, ohm: f64) -> Row {
 fn takes(filter: &mut WatchedFilter, start_s: f64, readings: impl IntoIterator<Item = f64>) -> Estimate {
     let mut last = None;
     for (k, ohm) in (0_u32..).zip(readings) {
-        let estimate = filter.step(&mut row(start_s + 0.2 * f64::from(k), ohm)).unwrap();
+        let estimate = filter.step(&row(start_s + 0.2 * f64::from(k), ohm)).unwrap();
         filter.remark(&estimate, "z").unwrap();
         last = Some(estimate);
     }
@@ -38,23 +38,65 @@ fn a_zero_forgets_strains_known_before_it() {
     let wanted = sensor.filter().known(&known);
     let mut filter = WatchedFilter::new(wanted, 0).unwrap();
     takes(&mut filter, 0.0, rested(50));
-    assert!(filter.zero(wanted, 1601.0).unwrap());
+    // Two each of 1600, 1601 and 1602 Ω in the last second.
+    assert_eq!(filter.zero(wanted), "R0 is 1601 now, the median of 6 readings; it starts again at zero");
     let after = takes(&mut filter, 10.0, rested(1));
     assert!(after.strain.abs() < 0.01, "{}", after.strain);
     let told = takes(&mut filter, 30.0, rested(1));
     assert!((told.strain - 0.1).abs() < 0.01, "{}", told.strain);
 }
 
+/// Where fewer than five readings came within a second, as with gaps, the last five known ones are the zero; a second zero at once has the
+/// same ones. Without a reading, before the first one or after another header, nothing changes, and the sentence says so.
+#[test]
+fn a_zero_needs_five_known_readings_or_takes_the_last() {
+    let sensor = sensor();
+    let mut filter = WatchedFilter::new(sensor.filter(), 0).unwrap();
+    let none = "R0 stays as it was: there is no reading yet";
+    assert_eq!(filter.zero(sensor.filter()), none);
+    takes(&mut filter, 0.0, [f64::NAN; 3]);
+    assert_eq!(filter.zero(sensor.filter()), none);
+    // At 1.0 to 2.2 s; then none for 2 s, and two at 4.2 and 4.4 s.
+    takes(&mut filter, 1.0, [1590.0, 1591.0, 1592.0, 1593.0, 1600.0, 1601.0, 1605.0]);
+    takes(&mut filter, 2.4, [f64::NAN; 9]);
+    takes(&mut filter, 4.2, [1606.0, 1607.0]);
+    // The last five begin at 1.8 s.
+    let last_five = "R0 is 1605 now, the median of 5 readings over 2.6 s; it starts again at zero";
+    assert_eq!([filter.zero(sensor.filter()), filter.zero(sensor.filter())], [last_five; 2]);
+    let after = takes(&mut filter, 4.6, [1605.0]);
+    let fresh = sensor.filter().rest_resistance(1605.0).initial_strain(0.0).build().unwrap().step(4.6, 1605.0).unwrap();
+    assert_eq!((after.strain, after.strain_sd), (fresh.strain, fresh.strain_sd));
+    filter.begin(sensor.filter(), false).unwrap();
+    assert_eq!(filter.zero(sensor.filter()), none);
+}
+
+/// A reading that cannot be R₀ is refused in words; the filter and its R₀ stay.
+#[test]
+fn a_zero_far_from_the_calibration_changes_nothing() {
+    let sensor = sensor();
+    let strain_of = |zeroed: bool| {
+        let mut filter = WatchedFilter::new(sensor.filter(), 0).unwrap();
+        takes(&mut filter, 0.0, [20_000.0; 10]);
+        if zeroed {
+            let said = filter.zero(sensor.filter());
+            assert!(said.starts_with("R0 stays as it was: "), "{said}");
+        }
+        takes(&mut filter, 2.0, rested(5)).strain
+    };
+    assert_eq!(strain_of(true), strain_of(false));
+}
+
 /// The median of the first readings is R₀, also for a filter that begins anew; a zero among them has the last word.
 #[test]
 fn the_first_readings_give_r0_unless_a_person_does() {
     let sensor = sensor();
-    let shifted = || rested(10).map(|ohm| 1.3 * ohm);
+    // The first five are 160 Ω larger.
+    let shifted = || (0_u32..).zip(rested(10)).map(|(k, ohm)| 1.3 * ohm + if k < 5 { 160.0 } else { 0.0 });
     let strain_of = |zeroed: bool| {
         let mut filter = WatchedFilter::new(sensor.filter(), 10).unwrap();
         takes(&mut filter, 0.0, shifted().take(5));
         if zeroed {
-            filter.zero(sensor.filter(), 1600.0).unwrap();
+            filter.zero(sensor.filter());
         }
         takes(&mut filter, 1.0, shifted().skip(5));
         filter.begin(sensor.filter(), false).unwrap();
@@ -65,9 +107,10 @@ fn the_first_readings_give_r0_unless_a_person_does() {
         let rows = (0_u32..).zip(shifted());
         rows.map(|(k, ohm)| filter.step(0.2 * f64::from(k), ohm).unwrap().strain).last().unwrap()
     };
-    // The sixth of ten readings in order of size is in the middle with the fifth: both are 1601 Ω, times 1.3.
-    assert_eq!(strain_of(false), given(1.3 * 1601.0));
-    assert_eq!(strain_of(true), given(1600.0));
+    // In order of size the last five come first: the middle of ten is between the largest of them, 1602 Ω times 1.3, and the least of
+    // the first five, 1600 Ω times 1.3, and 160 Ω. The middle of those alone is 1601 Ω times 1.3, and 160 Ω.
+    assert_eq!(strain_of(false), given(0.5 * (1.3 * 1602.0 + (1.3 * 1600.0 + 160.0))));
+    assert_eq!(strain_of(true), given(1.3 * 1601.0 + 160.0));
 }
 
 /// Twenty readings in the wrong unit are remarked upon, once.
@@ -77,7 +120,7 @@ fn the_unit_of_the_first_readings_is_doubted_once() {
     let mut filter = WatchedFilter::new(sensor.filter(), 0).unwrap();
     let mut remarks = Vec::new();
     for (k, ohm) in (0_u32..).zip(rested(40)) {
-        let estimate = filter.step(&mut row(0.2 * f64::from(k), 1e-3 * ohm)).unwrap();
+        let estimate = filter.step(&row(0.2 * f64::from(k), 1e-3 * ohm)).unwrap();
         remarks.extend(filter.remark(&estimate, "z").unwrap().map(|remark| (k, remark)));
     }
     let of_unit: Vec<u32> = remarks
@@ -135,8 +178,8 @@ fn streamed(header: &str, lines: impl Iterator<Item = String>) -> (Vec<Estimate>
         if k == RESTART {
             filter.begin(sensor.filter(), parser.has_temperature()).unwrap();
         }
-        let Ok(Line::Row(mut row)) = parser.take(line.as_bytes()) else { panic!("{line}") };
-        filter.step(&mut row).unwrap()
+        let Ok(Line::Row(row)) = parser.take(line.as_bytes()) else { panic!("{line}") };
+        filter.step(&row).unwrap()
     });
     (estimates.collect(), remark)
 }
@@ -175,6 +218,36 @@ fn a_stream_with_temperatures_is_converted() {
     }
 }
 
+/// A record has the readings as they came, beside their temperatures: filtered later, it gives the strains that were shown.
+#[test]
+fn a_record_is_converted_once() {
+    let cell = |number: f64| if number.is_nan() { String::new() } else { number.to_string() };
+    let header = "time_s,resistance_ohm,temperature_c";
+    let sent: Vec<String> =
+        chamber().into_iter().map(|[time_s, ohm, celsius]| format!("{time_s},{ohm},{}", cell(celsius))).collect();
+
+    let sensor = warmed_sensor();
+    let mut parser = LineParser::new("the port", Metadata::default());
+    let mut filter = WatchedFilter::new(sensor.filter(), 0).unwrap();
+    parser.take(header.as_bytes()).unwrap();
+    filter.begin(sensor.filter(), parser.has_temperature()).unwrap();
+    let mut shown = Vec::new();
+    let mut record = vec![["time_s"].into_iter().chain(parser.recorded_columns()).collect::<Vec<_>>().join(",")];
+    for line in &sent {
+        let Ok(Line::Row(row)) = parser.take(line.as_bytes()) else { panic!("{line}") };
+        shown.push(filter.step(&row).unwrap().strain);
+        record.push([row.time_s].into_iter().chain(parser.recorded(&row)).map(cell).collect::<Vec<_>>().join(","));
+    }
+    assert_eq!(record[0], header);
+    assert_eq!(record[1..], sent);
+
+    let trace = Trace::read(record.join("\n").as_bytes(), "record.csv").unwrap();
+    let converted = sensor.at_reference_temperature(&trace.readings.values, trace.temperature_c.as_ref().unwrap());
+    let mut again = sensor.filter().build().unwrap();
+    let strains = trace.time_s.iter().zip(&converted).map(|(time_s, ohm)| again.step(*time_s, *ohm).unwrap().strain);
+    assert_eq!(strains.collect::<Vec<_>>(), shown);
+}
+
 /// Without temperatures, strains are those of the readings as they are. Their variance is larger by what a reading, evenly distributed over
 /// the calibrated range, changes at temperatures that are evenly distributed over the calibration's; also after a zero.
 #[test]
@@ -205,7 +278,7 @@ fn a_stream_without_temperatures_has_wider_intervals() {
         let mut filter = WatchedFilter::new(sensor.filter(), 0).unwrap();
         filter.begin(sensor.filter(), false).unwrap();
         takes(&mut filter, 0.0, rested(20));
-        filter.zero(sensor.filter(), 1601.0).unwrap();
+        assert!(filter.zero(sensor.filter()).starts_with("R0 is 1601 now"));
         takes(&mut filter, 4.0, rested(20))
     };
     check(&zeroed(&warmed_sensor()), &zeroed(&sensor()));

@@ -1,9 +1,6 @@
 //! Filtering of a board's lines, as in `ohmstrain live`.
 
-use std::collections::VecDeque;
-
-use ohmstrain::number::{median, significant};
-use ohmstrain::trace::WatchedFilter;
+use ohmstrain::trace::{WatchedFilter, restarted};
 use ohmstrain::{MADE_BY, Sensor};
 use ohmstrain_bench_data::{Line, LineParser, Metadata, Row, RowWriter};
 use serde::Serialize;
@@ -12,9 +9,6 @@ use wasm_bindgen::prelude::*;
 use crate::json::{json, refused};
 use crate::stream_lines::Lines;
 
-/// Duration, s, over which the reading of the rested sensor is determined, and the smallest number of readings for that.
-const REST_S: f64 = 1.0;
-const LEAST_AT_REST: usize = 5;
 /// Numbers per row that are returned.
 const WIDTH: usize = 4;
 
@@ -24,11 +18,10 @@ pub struct Stream {
     sensor: Sensor,
     lines: Lines,
     filter: WatchedFilter,
-    /// Times, s, and readings of the last seconds.
-    recent: VecDeque<(f64, f64)>,
     counts: Counts,
     message: String,
-    record: Vec<u8>,
+    /// Rows for the record; after each restart or header, another record.
+    records: Vec<Vec<u8>>,
 }
 
 /// Counts of rows, gaps, bad lines and the like.
@@ -65,10 +58,9 @@ impl Stream {
             sensor: sensor.clone(),
             lines,
             filter,
-            recent: VecDeque::new(),
             counts: Counts::default(),
             message: String::new(),
-            record: vec![],
+            records: vec![vec![]],
         };
         if header.is_some() {
             stream.headed()?;
@@ -82,6 +74,7 @@ impl Stream {
             Ok(Line::Row(row)) => self.take_row(row, out),
             Ok(Line::Restarted(row)) => {
                 self.restart()?;
+                self.another_record();
                 self.take_row(row, out)
             }
             Ok(Line::Header) => self.headed(),
@@ -104,28 +97,29 @@ impl Stream {
             ));
         }
         self.message.clear();
-        if self.counts.rows > 0 { self.restart() } else { self.begin() }
+        self.another_record();
+        if self.counts.rows > 0 {
+            return self.restart();
+        }
+        self.begin()?.into_iter().for_each(|remark| self.message = remark.into());
+        Ok(())
     }
 
-    /// Starts a new filter.
-    fn begin(&mut self) -> Result<(), String> {
+    /// Starts a new filter; returns a remark on its columns.
+    fn begin(&mut self) -> Result<Option<&'static str>, String> {
         let has_temperature = self.lines.parser.has_temperature();
-        let remark = self.filter.begin(self.sensor.filter(), has_temperature).map_err(|error| error.to_string())?;
-        remark.into_iter().for_each(|remark| self.message = remark.into());
-        Ok(())
+        self.filter.begin(self.sensor.filter(), has_temperature).map_err(|error| error.to_string())
     }
 
     /// Restarts everything that depends on time, after the clock has restarted.
     fn restart(&mut self) -> Result<(), String> {
         self.counts.restarts += 1;
-        self.begin()?;
-        self.recent.clear();
-        self.message = "the clock has started again, and so has the filter".into();
+        self.message = restarted(self.begin()?);
         Ok(())
     }
 
-    fn take_row(&mut self, mut row: Row, out: &mut Vec<f64>) -> Result<(), String> {
-        let estimate = match self.filter.step(&mut row) {
+    fn take_row(&mut self, row: Row, out: &mut Vec<f64>) -> Result<(), String> {
+        let estimate = match self.filter.step(&row) {
             Ok(estimate) => estimate,
             Err(error) => {
                 self.counts.bad_lines += 1;
@@ -133,20 +127,14 @@ impl Stream {
                 return Ok(());
             }
         };
-        let value = row.reading.value;
         self.counts.rows += 1;
-        self.counts.missing += u64::from(!value.is_finite());
-        self.recent.push_back((row.time_s, value));
-        while self.recent.front().is_some_and(|(time_s, _)| *time_s < row.time_s - REST_S)
-            && self.recent.len() > LEAST_AT_REST
-        {
-            self.recent.pop_front();
-        }
+        self.counts.missing += u64::from(!row.reading.value.is_finite());
         if let Some(remark) = self.filter.remark(&estimate, "say so").map_err(|error| error.to_string())? {
             self.message = remark;
         }
         self.record_row(&row).map_err(|error| error.to_string())?;
-        out.extend([row.time_s, value, estimate.strain, estimate.strain_sd]);
+        let reading = estimate.resistance.unwrap_or(f64::NAN);
+        out.extend([row.time_s, reading, estimate.strain, estimate.strain_sd]);
         Ok(())
     }
 
@@ -156,8 +144,21 @@ impl Stream {
         parser.reading_kind().map(|_| "time_s").into_iter().chain(parser.recorded_columns()).collect()
     }
 
+    /// Returns the lines above a record's header.
+    fn metadata(&self) -> String {
+        let mut metadata = self.lines.parser.metadata();
+        metadata.other.retain(|(key, _)| key != "made_by");
+        format!("# made_by = {MADE_BY} live\n{metadata}")
+    }
+
+    /// Begins another record: times after a restart are no later ones, and a header may have other columns.
+    fn another_record(&mut self) {
+        self.records.push(format!("{}{}\n", self.metadata(), self.columns().join(",")).into_bytes());
+    }
+
     fn record_row(&mut self, row: &Row) -> std::io::Result<()> {
-        let mut rows = RowWriter::new(&mut self.record);
+        let Some(record) = self.records.last_mut() else { return Ok(()) };
+        let mut rows = RowWriter::new(record);
         rows.number(row.time_s);
         self.lines.parser.recorded(row).for_each(|number| rows.number(number));
         rows.end()?;
@@ -180,10 +181,8 @@ impl Stream {
     /// Returns the summary: counts, columns, the last message.
     #[wasm_bindgen(unchecked_return_type = "StreamSummary")]
     pub fn summary(&self) -> Result<JsValue, JsError> {
-        let mut metadata = self.lines.parser.metadata();
-        metadata.other.retain(|(key, _)| key != "made_by");
-        let metadata = format!("# made_by = {MADE_BY} live\n{metadata}");
-        json(&Described { counts: self.counts, message: &self.message, columns: self.columns(), metadata })
+        let (columns, metadata) = (self.columns(), self.metadata());
+        json(&Described { counts: self.counts, message: &self.message, columns, metadata })
     }
 
     /// Takes the sensor as rested and unstretched now: the strain is zero.
@@ -195,21 +194,13 @@ impl Stream {
 
     /// Takes the sensor as rested now: its reading becomes R₀, and the strain starts again at zero.
     pub fn zero(&mut self) {
-        let readings: Vec<f64> =
-            self.recent.iter().map(|(_, reading)| *reading).filter(|reading| reading.is_finite()).collect();
-        let count = readings.len();
-        let Some(rest) = median(readings) else { return };
-        self.message = match self.filter.zero(self.sensor.filter(), rest) {
-            Err(refused) => format!("R0 stays as it was: {refused}"),
-            Ok(_) => {
-                self.recent.clear();
-                format!("R0 is {} now, the median of {count} readings", significant(rest, 5))
-            }
-        };
+        self.message = self.filter.zero(self.sensor.filter());
     }
 
-    /// Returns the rows of a trace CSV since the last call.
-    pub fn recorded(&mut self) -> String {
-        String::from_utf8(std::mem::take(&mut self.record)).unwrap_or_default()
+    /// Returns the rows of a trace CSV since the last call. The first text continues the record; each one after it is the beginning of
+    /// another record, for another clock or header, with the lines above its rows.
+    pub fn recorded(&mut self) -> Vec<String> {
+        let records = std::mem::replace(&mut self.records, vec![vec![]]);
+        records.into_iter().map(|record| String::from_utf8(record).unwrap_or_default()).collect()
     }
 }

@@ -23,7 +23,7 @@ use crate::{Error, Reading, Recording, Sensor};
 pub use calibrate::{Refusal, calibrate, distrusted_rows, tested_on};
 pub use hand::{HAND_FORMAT, HandChannel, HandDescription, HandError, HandJoint};
 pub use marks::{Marked, take_marks};
-pub use watched::{FIRST_LIVE_READINGS, WatchedFilter};
+pub use watched::{FIRST_LIVE_READINGS, LEAST_AT_REST, REST_S, WatchedFilter, restarted};
 
 /// A recording in memory.
 #[derive(Clone, Debug)]

@@ -1,14 +1,28 @@
+use std::collections::VecDeque;
+
 use ohmstrain_bench_data::Row;
 
 use super::reading;
 use crate::known::KNOWN_TO;
 use crate::number::{median, significant};
 use crate::{
-    Error, Estimate, Filter, FilterBuilder, Interface, Known, QuietWatch, Sensor, Thermometer, UnitDoubt, ValidityWatch,
+    Error, Estimate, Filter, FilterBuilder, Interface, Known, QuietWatch, Reading, Sensor, Thermometer, UnitDoubt,
+    ValidityWatch,
 };
 
 /// Number of first readings whose unit is checked if a reader waits for each row.
 pub const FIRST_LIVE_READINGS: usize = 20;
+/// Duration, s, over which the reading of the rested sensor is determined.
+pub const REST_S: f64 = 1.0;
+/// Smallest number of readings for that: where fewer came, the last ones are taken, however old.
+pub const LEAST_AT_REST: usize = 5;
+
+/// Returns the sentence for a person after a restart of the clock, with the remark of [`WatchedFilter::begin`].
+#[must_use]
+pub fn restarted(remark: Option<&str>) -> String {
+    let again = "the clock has started again, and so has the filter";
+    remark.map_or_else(|| again.into(), |remark| format!("{again}; {remark}"))
+}
 
 /// A filter on rows as they arrive, converted to the temperature of the calibration, with remarks for a person who watches: on use outside
 /// the calibrated range, on holds that may be rests, on the unit of the first readings, and on temperatures that are not measured.
@@ -27,6 +41,8 @@ pub struct WatchedFilter {
     rest_of_first: usize,
     /// The first known readings.
     early: Vec<f64>,
+    /// Times, s, and known readings for the next zero: those of the last second, or the last few.
+    recent: VecDeque<(f64, f64)>,
     /// Time of the last row, s.
     last_s: f64,
     /// True if the sensor was taken as at rest, and no row has come since.
@@ -49,13 +65,14 @@ impl WatchedFilter {
             rest,
             rest_of_first,
             early: vec![],
+            recent: VecDeque::new(),
             last_s: f64::NEG_INFINITY,
             rests_first: false,
         })
     }
 
     /// Begins anew with another filter, for another clock or header; R₀, the first readings and the last temperature remain. Without
-    /// temperatures, intervals are wider by what the calibration's do to the strain; returns a remark if they are.
+    /// temperatures, intervals are wider by the effect of the calibration's on the strain; returns a remark if they are.
     ///
     /// # Errors
     /// As [`FilterBuilder::build`]. The filter then stays as it was.
@@ -69,6 +86,7 @@ impl WatchedFilter {
         self.thermometer = Thermometer::new(&sensor).after(self.thermometer.last_c());
         self.sensor = sensor;
         self.last_s = f64::NEG_INFINITY;
+        self.recent.clear();
         self.watch(known);
         if self.rests_first {
             self.rest()?;
@@ -82,14 +100,21 @@ impl WatchedFilter {
         self.quiet = QuietWatch::new(&self.sensor, self.rest, known);
     }
 
-    /// Takes a row, converts its reading to the temperature of the calibration, and returns its estimate.
+    /// Takes a row, and returns the estimate of its reading at the temperature of the calibration.
     ///
     /// # Errors
     /// As [`Filter::step`].
-    pub fn step(&mut self, row: &mut Row) -> Result<Estimate, Error> {
-        row.reading.value = self.thermometer.at_reference(row.reading.value, row.temperature_c);
-        let estimate = self.filter.step(row.time_s, reading(&row.reading))?;
+    pub fn step(&mut self, row: &Row) -> Result<Estimate, Error> {
+        let value = self.thermometer.at_reference(row.reading.value, row.temperature_c);
+        let estimate = self.filter.step(row.time_s, Reading { value, ..reading(&row.reading) })?;
         (self.last_s, self.rests_first) = (row.time_s, false);
+        if value.is_finite() {
+            self.recent.push_back((row.time_s, value));
+        }
+        let is_old = |first: &(f64, f64)| first.0 < row.time_s - REST_S;
+        while self.recent.len() > LEAST_AT_REST && self.recent.front().is_some_and(is_old) {
+            self.recent.pop_front();
+        }
         Ok(estimate)
     }
 
@@ -137,13 +162,26 @@ impl WatchedFilter {
         Ok(())
     }
 
-    /// Makes a reading at the temperature of the calibration R₀, whatever the first readings say, and begins anew at zero, unless the
-    /// sensor's range excludes it. The sensor stays the one that it began with. Of the known strains those after the last row apply.
-    /// Returns true if it begins at zero.
-    ///
-    /// # Errors
-    /// As [`FilterBuilder::build`]. The filter then stays as it was.
-    pub fn zero(&mut self, wanted: FilterBuilder, rest: f64) -> Result<bool, Error> {
+    /// Takes the sensor as rested now: the median of the last second's known readings, or of the last five if fewer came, is R₀ at the
+    /// temperature of the calibration, whatever the first readings say. The filter begins anew at zero, unless the sensor's range excludes
+    /// it. The sensor stays the one that it began with. Of the known strains those after the last row apply. Where no reading has come
+    /// on this clock, or it cannot be R₀, the filter stays as it was. Returns a sentence for the person about the change.
+    pub fn zero(&mut self, wanted: FilterBuilder) -> String {
+        let readings: Vec<f64> = self.recent.iter().map(|(_, reading)| *reading).collect();
+        let (count, first_s) = (readings.len(), self.recent.front().map_or(self.last_s, |(time_s, _)| *time_s));
+        let Some(rest) = median(readings) else { return "R0 stays as it was: there is no reading yet".into() };
+        let at_zero = match self.begin_at_zero(wanted, rest) {
+            Ok(at_zero) => at_zero,
+            Err(refused) => return format!("R0 stays as it was: {refused}"),
+        };
+        let span_s = self.last_s - first_s;
+        let over = if span_s > REST_S { format!(" over {} s", significant(span_s, 2)) } else { String::new() };
+        let starts = if at_zero { "; it starts again at zero" } else { "" };
+        format!("R0 is {} now, the median of {count} readings{over}{starts}", significant(rest, 5))
+    }
+
+    /// Makes a reading R₀, and begins anew at zero if the sensor's range includes it; returns true if it does.
+    fn begin_at_zero(&mut self, wanted: FilterBuilder, rest: f64) -> Result<bool, Error> {
         let to_come: Vec<Known> = wanted.known.iter().filter(|known| known.time_s > self.last_s).copied().collect();
         let mut wanted = wanted.known(&to_come).rest_resistance(rest);
         (wanted.sensor, wanted.initial_strain) = (&self.sensor, None);

@@ -3,12 +3,12 @@
 use std::io;
 
 use ohmstrain::number::median;
-use ohmstrain::trace::HandDescription;
+use ohmstrain::trace::{HandDescription, LEAST_AT_REST, REST_S};
 use ohmstrain_bench_data::{Headed, Metadata, Row};
 
 use super::Shown;
 use super::recorder::Recorder;
-use super::track::{LEAST_AT_REST, REST_S, Timed, Track};
+use super::track::{Timed, Track};
 use crate::args::LiveArgs;
 use crate::commands::hand::joint::{Channel, Joint, JointRow};
 use crate::commands::hand::lines::{HandParser, channels};

@@ -2,14 +2,13 @@
 
 use std::io;
 
-use ohmstrain::number::{median, significant};
 use ohmstrain::trace::{self, WatchedFilter, check_unit};
 use ohmstrain::{Error, Estimate, FilterBuilder, Sensor};
 use ohmstrain_bench_data::{Headed, Line, LineParser, Row};
 
 use super::Shown;
 use super::recorder::Recorder;
-use super::track::{LEAST_AT_REST, REST_S, Timed, Track};
+use super::track::{Timed, Track};
 use crate::args::{LiveArgs, RestResistance};
 use crate::error::CliError;
 use crate::port::{Due, Taker};
@@ -19,8 +18,6 @@ use crate::run::{builder, builder_anew, of_first, rest_resistance};
 #[derive(Clone, Copy)]
 pub struct Point {
     pub time_s: f64,
-    /// The reading; NaN where it is missing.
-    pub reading: f64,
     /// Strain, and half its 95 % interval.
     pub strain: f64,
     pub half_width: f64,
@@ -93,23 +90,26 @@ impl<'a> Session<'a> {
         }
         // Messages about the lines above it no longer apply.
         self.track.message.clear();
-        if self.track.pulse.counts.rows > 0 { self.restart() } else { Ok(self.begin()?) }
+        if self.track.pulse.counts.rows > 0 {
+            return self.restart();
+        }
+        self.begin()?.into_iter().for_each(|remark| self.track.message = remark.into());
+        Ok(())
     }
 
-    /// Starts a new filter.
-    fn begin(&mut self) -> Result<(), Error> {
+    /// Starts a new filter; returns a remark on its columns.
+    fn begin(&mut self) -> Result<Option<&'static str>, Error> {
         let wanted = wanted(self.args, &self.sensor, &self.track);
         let remark = self.filter.begin(wanted, self.lines.has_temperature())?;
-        remark.into_iter().for_each(|remark| self.track.message = remark.into());
         self.track.pulse.restart();
-        Ok(())
+        Ok(remark)
     }
 
     /// Restarts everything that depends on time, after the clock has restarted.
     fn restart(&mut self) -> Result<(), CliError> {
         self.track.pulse.counts.restarts += 1;
-        self.begin()?;
-        self.restarted("the clock has started again, and so has the filter");
+        let remark = self.begin()?;
+        self.restarted(&trace::restarted(remark));
         Ok(())
     }
 }
@@ -143,8 +143,8 @@ impl Taker for Session<'_> {
         if due.restarted {
             self.restart()?;
         }
-        let mut row = due.row;
-        let estimate = match self.filter.step(&mut row) {
+        let row = due.row;
+        let estimate = match self.filter.step(&row) {
             Ok(estimate) => estimate,
             Err(error) => {
                 self.track.skip(error.to_string());
@@ -152,8 +152,8 @@ impl Taker for Session<'_> {
             }
         };
         self.track.pulse.count(row.time_s, u64::from(!row.reading.value.is_finite()));
-        let (reading, half_width) = (row.reading.value, 1.96 * estimate.strain_sd);
-        let point = Point { time_s: row.time_s, reading, strain: estimate.strain, half_width };
+        let half_width = 1.96 * estimate.strain_sd;
+        let point = Point { time_s: row.time_s, strain: estimate.strain, half_width };
         self.track.push(point, self.args.window_s);
         let remark =
             self.filter.remark(&estimate, "z").map_err(|refused| match self.args.estimate.rest_resistance {
@@ -174,30 +174,14 @@ impl Shown for Session<'_> {
         &mut self.track
     }
 
-    /// Begins a recording of the reading, as a code if it is one, and of the reference.
+    /// Begins a recording of the reading as it comes, as a code if it is one, of the reference and of the temperature.
     fn new_recorder(&self) -> io::Result<Recorder> {
         Recorder::begin(&self.args.record, self.lines.metadata(), self.lines.recorded_columns())
     }
 
     /// Makes the reading R₀, and the strain zero.
     fn zero(&mut self) -> Result<(), CliError> {
-        let Some(last_s) = self.track.points.back().map(|point| point.time_s) else { return Ok(()) };
-        let recent = self.track.points.iter().rev().take_while(|point| point.time_s >= last_s - REST_S);
-        let mut readings: Vec<f64> = recent.map(|point| point.reading).filter(|reading| reading.is_finite()).collect();
-        if readings.len() < LEAST_AT_REST {
-            let known = self.track.points.iter().rev().map(|point| point.reading).filter(|reading| reading.is_finite());
-            readings = known.take(LEAST_AT_REST).collect();
-        }
-        let count = readings.len();
-        let Some(rest) = median(readings) else { return Ok(()) };
-        self.track.message = match self.filter.zero(wanted(self.args, &self.sensor, &self.track), rest) {
-            Err(refused) => format!("R0 stays as it was: {refused}"),
-            Ok(at_zero) => {
-                self.track.pulse.restart();
-                let starts = if at_zero { "; it starts again at zero" } else { "" };
-                format!("R0 is {} now, the median of {count} readings{starts}", significant(rest, 5))
-            }
-        };
+        self.track.message = self.filter.zero(wanted(self.args, &self.sensor, &self.track));
         Ok(())
     }
 }

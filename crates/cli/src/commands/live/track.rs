@@ -2,14 +2,13 @@
 
 use std::collections::VecDeque;
 
+use ohmstrain::trace::REST_S;
+
 use super::pulse::Pulse;
 use super::recorder::Recorder;
 
 /// Largest number of rows kept for the plot.
 const MOST_POINTS: usize = 1 << 16;
-/// Duration, s, over which the reading of the rested sensor is determined, and the smallest number of readings for that.
-pub const REST_S: f64 = 1.0;
-pub const LEAST_AT_REST: usize = 5;
 
 /// A row of a plot.
 pub trait Timed {
