@@ -46,7 +46,7 @@ impl MotionStats {
             phases.add(samples.time_s, &rate);
             rates.extend(rate);
             strains.push(strain);
-            longest_s = longest_s.max(samples.time_s[samples.len() - 1] - samples.time_s[0]);
+            longest_s = longest_s.max(samples.duration_s());
         }
         let (low, high) = extent(strains.iter().flatten().copied());
         let made = |strain: &Vec<f64>| strokes(strain, high - low).last().copied();
@@ -105,23 +105,21 @@ struct PhaseDurations {
 }
 
 /// Fraction of the fast rates (90th percentile) below which a body is at rest.
-pub(crate) const REST_SHARE: f64 = 0.05;
+const REST_SHARE: f64 = 0.05;
 /// Minimum number of rows of a phase; shorter ones are flicker.
 const FEWEST_PHASE_ROWS: usize = 2;
 
 impl PhaseDurations {
     fn add(&mut self, time_s: &[f64], rate: &[f64]) {
-        let speeds = sorted(rate.iter().map(|v| v.abs()));
-        let rest = REST_SHARE * speeds[(speeds.len() - 1) * 9 / 10];
-        let phase = |v: f64| i8::from(v > rest) - i8::from(v < -rest);
+        let directions = directions(rate);
         let mut start = 0;
         for k in 1..=rate.len() {
-            if k < rate.len() && phase(rate[k]) == phase(rate[start]) {
+            if directions.get(k) == Some(&directions[start]) {
                 continue;
             }
             if k - start >= FEWEST_PHASE_ROWS {
                 let duration = time_s[k.min(rate.len() - 1)] - time_s[start];
-                if phase(rate[start]) == 0 {
+                if directions[start] == 0 {
                     self.holds.push(duration);
                 } else {
                     self.moves.push(duration);
@@ -130,7 +128,8 @@ impl PhaseDurations {
             }
             start = k;
         }
-        self.speeds.extend(rate.iter().filter(|v| phase(**v) != 0).map(|v| v.abs()));
+        let moving = rate.iter().zip(&directions).filter(|(_, direction)| **direction != 0);
+        self.speeds.extend(moving.map(|(v, _)| v.abs()));
     }
 
     /// True if the body rests for longer than the moments in which it turns around.
@@ -149,6 +148,13 @@ impl PhaseDurations {
         let speeds = sorted(self.speeds.iter().copied());
         speeds.get(speeds.len() * share / of).copied().unwrap_or(0.0)
     }
+}
+
+/// Returns the direction of each rate: 1, -1, or 0 at rest.
+pub(crate) fn directions(rate: &[f64]) -> Vec<i8> {
+    let speeds = sorted(rate.iter().map(|v| v.abs()));
+    let rest = REST_SHARE * speeds.get(speeds.len().saturating_sub(1) * 9 / 10).copied().unwrap_or(0.0);
+    rate.iter().map(|v| i8::from(*v > rest) - i8::from(*v < -rest)).collect()
 }
 
 /// Returns the time at which the autocorrelation crosses 1/e, s, at most half the recording.

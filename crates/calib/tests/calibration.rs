@@ -160,7 +160,7 @@ fn calibration_makes_a_filter_that_beats_the_static_inverse_and_knows_how_far() 
     assert_eq!(wide.widened_most(), ["filter"]);
     // Same samples, same parameters.
     let repeated = calibrate(&[training], &[LawOptions::default()], &[EstimatorKind::Ekf], None, |_| ()).unwrap();
-    assert_eq!((repeated.law, repeated.estimators), (calibration.law, calibration.estimators));
+    assert_eq!(sensor(&repeated), sensor(&calibration));
 }
 
 #[test]
@@ -174,11 +174,12 @@ fn the_estimator_that_does_best_becomes_the_default() {
         }
     };
     let calibration = calibrate(&[bench.samples().head(600)], &[LawOptions::default()], &kinds, None, count).unwrap();
-    let best = calibration.estimators[&calibration.default_estimator].score;
+    let params = sensor(&calibration);
+    let best = params.estimators[&params.default_estimator].score;
     for kind in kinds {
         // A single Gaussian must be better by 0.1.
         let handicap = if kind == EstimatorKind::Ekf { 0.1 } else { 0.0 };
-        assert!(calibration.estimators[&kind].score + handicap >= best, "{kind:?}");
+        assert!(params.estimators[&kind].score + handicap >= best, "{kind:?}");
     }
     // A step of Nelder-Mead evaluates one or two points, and after a shrinkage all corners of the simplex.
     assert!(calls > announced / 2 && calls < 2 * announced, "{calls} of {announced}");
@@ -198,8 +199,9 @@ fn a_finer_recording_gives_the_same_filter() {
         Bench { time_s: between(&coarse.time_s), reading: between(&coarse.reading), strain: between(&coarse.strain) };
     let of = |bench: &Bench| {
         let kinds = [EstimatorKind::Ekf];
-        let calibration = calibrate(&[bench.samples()], &[LawOptions::default()], &kinds, None, |_| ()).unwrap();
-        (calibration.law, calibration.estimators[&EstimatorKind::Ekf])
+        let params = sensor(&calibrate(&[bench.samples()], &[LawOptions::default()], &kinds, None, |_| ()).unwrap());
+        let ekf = params.estimators[&EstimatorKind::Ekf];
+        (params.law, ekf)
     };
     let ((coarse_law, coarse), (fine_law, fine)) = (of(&coarse), of(&fine));
     for (a, b) in coarse_law.branches.iter().zip(&fine_law.branches) {

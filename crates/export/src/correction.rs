@@ -28,7 +28,7 @@ pub struct CorrectionConstants {
     upper: Vec<Literal>,
     inducing: usize,
     processes: [ProcessConstants; 2],
-    quadratics: Option<[QuadraticConstants; 2]>,
+    quadratics: Option<[OwnedQuadratic<Literal>; 2]>,
     simulated: Option<SimulatedConstants>,
     strain_variance: Literal,
     variance_factor: Literal,
@@ -89,19 +89,6 @@ impl SimulatedConstants {
     }
 }
 
-/// A quadratic function.
-#[derive(Debug, Serialize)]
-struct QuadraticConstants {
-    linear: Vec<Literal>,
-    square: Vec<Literal>,
-}
-
-impl QuadraticConstants {
-    fn new(of: &OwnedQuadratic) -> Self {
-        Self { linear: narrowed(&of.linear), square: narrowed(&of.square) }
-    }
-}
-
 fn narrow(number: f64) -> Literal {
     Literal(number as f32)
 }
@@ -138,7 +125,7 @@ impl CorrectionConstants {
                     &learned.residual,
                 ),
             ],
-            quadratics: quadratics.map(|both| both.each_ref().map(QuadraticConstants::new)),
+            quadratics: quadratics.map(|both| both.each_ref().map(|one| one.map(narrow))),
             simulated: learned.simulated.as_ref().map(SimulatedConstants::new),
             strain_variance: narrow(learned.strain_variance),
             variance_factor: narrow(learned.variance_factor),

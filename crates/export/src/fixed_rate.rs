@@ -8,7 +8,7 @@ use ohmstrain_ekf::{
 use ohmstrain_model::{Motion, SensorLaw, StrainRange, SwitchedModel};
 use ohmstrain_sensor::{EstimatorKind, EstimatorParams, HISTORIES, HYPOTHESES, PhaseParams, SensorParams};
 
-use super::law::{PriorConstants, narrow_law, narrow_noise};
+use super::law::{PriorConstants, narrow_noise};
 use super::plan::ChipFilter;
 use super::steps::StepTable;
 use super::twin::parts::{Numbers, Parts, filter_parts};
@@ -55,7 +55,7 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
         let [time, rate_sd, mean, sd] = PriorConstants::new(&motion).numbers();
         let model = Motion::ornstein_uhlenbeck(time, rate_sd, mean, sd)
             .and_then(|motion| motion.with_phase_rate(speed as f32))
-            .and_then(|motion| SwitchedModel::new(narrow_law(&law), motion, narrow_noise(noise.to_model())))
+            .and_then(|motion| SwitchedModel::new(law.to(), motion, narrow_noise(noise.to_model())))
             .map_err(parameter)?;
         let phases = phases.filter(|_| filter.kind != EstimatorKind::Ekf);
         let live = LiveParts { dt_s: f64::from(dt_s), ..filter.parts };

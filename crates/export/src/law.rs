@@ -1,6 +1,6 @@
 //! Law, noise and motion from the calibration, in single precision.
 
-use ohmstrain_model::{Branch, Gauge, ModelNoise, SensorLaw, StrainRange};
+use ohmstrain_model::{Branch, Gauge, ModelNoise, SensorLaw};
 use ohmstrain_sensor::{MotionParams, PhaseParams};
 use serde::Serialize;
 
@@ -128,36 +128,6 @@ pub fn narrow_noise(noise: ModelNoise<f64>) -> ModelNoise<f32> {
         baseline_sd: noise.baseline_sd as f32,
         baseline_time_s: noise.baseline_time_s as f32,
     }
-}
-
-pub fn narrow_law<const B: usize>(law: &SensorLaw<f64, B>) -> SensorLaw<f32, B> {
-    let gauge = match law.gauge {
-        Gauge::Polynomial { coefficients } => Gauge::Polynomial { coefficients: coefficients.map(|a| a as f32) },
-        Gauge::DecayingExponential { slope, decay_strain } => {
-            Gauge::DecayingExponential { slope: slope as f32, decay_strain: decay_strain as f32 }
-        }
-        Gauge::Tunnelling { gap, barrier, path_loss } => {
-            Gauge::Tunnelling { gap: gap as f32, barrier: barrier as f32, path_loss: path_loss as f32 }
-        }
-    };
-    let branch = |branch: &Branch<f64>| Branch {
-        tau_s: branch.tau_s as f32,
-        extend_gain: branch.extend_gain as f32,
-        retract_gain: branch.retract_gain as f32,
-        extend_gain_slope: branch.extend_gain_slope as f32,
-        retract_gain_slope: branch.retract_gain_slope as f32,
-    };
-    SensorLaw {
-        gauge,
-        extend_viscosity_s: law.extend_viscosity_s as f32,
-        retract_viscosity_s: law.retract_viscosity_s as f32,
-        branches: law.branches.each_ref().map(branch),
-        range: narrow_range(law.range),
-    }
-}
-
-fn narrow_range(range: StrainRange<f64>) -> StrainRange<f32> {
-    StrainRange { lower: range.lower as f32, upper: range.upper as f32 }
 }
 
 fn gauge_constants(gauge: &Gauge<f32>) -> GaugeConstants {

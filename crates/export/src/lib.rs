@@ -31,6 +31,7 @@ use minijinja::Environment;
 use minijinja::syntax::SyntaxConfig;
 use minijinja::value::Serde;
 use ohmstrain_sensor::{EstimatorKind, SensorParams};
+use serde::Serialize;
 
 pub use boards::{BOARDS, Board};
 pub use budget::{Budget, Candidate, Room, candidates, first_fitting};
@@ -185,6 +186,16 @@ fn environment() -> Result<Environment<'static>, ExportError> {
     Ok(environment)
 }
 
+/// Fills templates, and puts the prefix into their paths and contents.
+fn filled(templates: &[Template], values: &impl Serialize, prefix: &Prefix) -> Result<Vec<SourceFile>, ExportError> {
+    let environment = environment()?;
+    let file = |(path, template): &Template| {
+        let content = environment.render_named_str(path, template, Serde(values))?;
+        Ok(SourceFile { path: prefix.put_into(path), content: prefix.put_into(&content) })
+    };
+    templates.iter().map(file).collect()
+}
+
 /// Returns the files of a sensor with readings every `dt_s` seconds; the header repeats its promise.
 ///
 /// # Errors
@@ -202,12 +213,5 @@ pub fn files(
         ExportTarget::C => &C,
         ExportTarget::Rust => &RUST,
     };
-    let mut environment = environment()?;
-    let mut files = Vec::new();
-    for (path, template) in templates {
-        environment.add_template(path, template)?;
-        let content = environment.get_template(path)?.render(Serde(&exported))?;
-        files.push(SourceFile { path: prefix.put_into(path), content: prefix.put_into(&content) });
-    }
-    Ok(files)
+    filled(templates, &exported, prefix)
 }

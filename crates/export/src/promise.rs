@@ -3,7 +3,8 @@
 use comfy_table::{Table, presets};
 use ohmstrain_sensor::{Scores, SensorParams};
 
-use crate::{Budget, ChipFilter, Cost, ExportError, Plan, cost};
+use crate::cost::cost_of;
+use crate::{Budget, ChipFilter, Cost, ExportError, Plan};
 
 /// Scores on a recording: of the exported filter, of the sensor's filter on this computer, and of a static cubic.
 #[derive(Clone, Copy, Debug)]
@@ -41,7 +42,7 @@ impl Promise {
         budget: Option<&Budget>,
     ) -> Result<Self, ExportError> {
         let chip = ChipFilter::new(params, plan)?;
-        let cost = cost(params, plan, dt_s)?;
+        let cost = cost_of(params, &chip, dt_s)?;
         let mut table = Table::new();
         table.load_style(presets::ASCII_MARKDOWN);
         table.set_header(["estimate", "%FS", "50/90/95 %", "instructions", "flash, B", "RAM, B", "of it stack, B"]);

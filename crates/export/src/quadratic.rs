@@ -2,9 +2,10 @@
 
 use nalgebra::{DMatrix, DVector};
 use ohmstrain_ekf::correction::Quadratic;
+use serde::Serialize;
 
 /// Owned numbers of a [`Quadratic`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct OwnedQuadratic<T = f64> {
     /// Coefficients of the inputs.
     pub linear: Vec<T>,
@@ -16,6 +17,14 @@ impl<T> OwnedQuadratic<T> {
     /// Borrows it in the form that a correction takes.
     pub fn borrowed(&self) -> Quadratic<'_, T> {
         Quadratic { linear: &self.linear, square: &self.square }
+    }
+}
+
+impl OwnedQuadratic {
+    /// Converts each number.
+    pub fn map<T>(&self, number: impl Fn(f64) -> T) -> OwnedQuadratic<T> {
+        let all = |numbers: &[f64]| numbers.iter().copied().map(&number).collect();
+        OwnedQuadratic { linear: all(&self.linear), square: all(&self.square) }
     }
 }
 

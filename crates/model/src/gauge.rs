@@ -1,5 +1,5 @@
-use crate::Scalar;
 use crate::error::{ParameterError, Problem};
+use crate::{Number, Scalar};
 
 /// The quasi-static curve g(ε): relative change of resistance once all branches have relaxed, with g(0) = 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,6 +28,22 @@ pub enum Gauge<T> {
         /// Loss of conducting paths W.
         path_loss: T,
     },
+}
+
+impl Gauge<f64> {
+    /// Converts it to another precision.
+    #[must_use]
+    pub fn to<T: Number>(&self) -> Gauge<T> {
+        match *self {
+            Self::Polynomial { coefficients } => Gauge::Polynomial { coefficients: coefficients.map(T::of) },
+            Self::DecayingExponential { slope, decay_strain } => {
+                Gauge::DecayingExponential { slope: T::of(slope), decay_strain: T::of(decay_strain) }
+            }
+            Self::Tunnelling { gap, barrier, path_loss } => {
+                Gauge::Tunnelling { gap: T::of(gap), barrier: T::of(barrier), path_loss: T::of(path_loss) }
+            }
+        }
+    }
 }
 
 impl<T: Scalar> Gauge<T> {

@@ -82,6 +82,26 @@ pub struct SensorLaw<T, const B: usize> {
     pub range: StrainRange<T>,
 }
 
+impl<const B: usize> SensorLaw<f64, B> {
+    /// Converts it to another precision.
+    #[must_use]
+    pub fn to<T: Number>(&self) -> SensorLaw<T, B> {
+        SensorLaw {
+            gauge: self.gauge.to(),
+            extend_viscosity_s: T::of(self.extend_viscosity_s),
+            retract_viscosity_s: T::of(self.retract_viscosity_s),
+            branches: self.branches.map(|branch| Branch {
+                tau_s: T::of(branch.tau_s),
+                extend_gain: T::of(branch.extend_gain),
+                retract_gain: T::of(branch.retract_gain),
+                extend_gain_slope: T::of(branch.extend_gain_slope),
+                retract_gain_slope: T::of(branch.retract_gain_slope),
+            }),
+            range: StrainRange { lower: T::of(self.range.lower), upper: T::of(self.range.upper) },
+        }
+    }
+}
+
 impl<T: Scalar, const B: usize> SensorLaw<T, B> {
     /// Checks every parameter.
     ///

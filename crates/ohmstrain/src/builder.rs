@@ -1,10 +1,10 @@
 use std::sync::Arc;
 
-use ohmstrain_ekf::live::{DOUBT, Doubts, KNOWN_BEYOND, Protections};
+use ohmstrain_ekf::live::{DOUBT, Doubts, Protections};
 use ohmstrain_ekf::{Guard, Influence};
 use ohmstrain_sensor::{EstimatorKind, KnownErrors, Options, SensorError, Start};
 
-use crate::estimate::Scale;
+use crate::estimate::{Scale, check_known};
 use crate::filter::{Kernel, RowWriter};
 use crate::known::in_order;
 use crate::stored::{MadeOf, StoredOptions};
@@ -232,8 +232,7 @@ impl<'a> FilterBuilder<'a> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn build(self) -> Result<Filter, Error> {
-        let kind = self.kind();
-        Ok(Filter::new(self.kernel(kind)?))
+        Ok(Filter::new(self.kernel()?))
     }
 
     /// Builds a filter that estimates each row from the readings up to `lag_s` seconds after it.
@@ -254,8 +253,7 @@ impl<'a> FilterBuilder<'a> {
         if !(lag_s.is_finite() && lag_s > 0.0) {
             return Err(Error::NotPositive { name: "lag", found: lag_s });
         }
-        let kind = self.kind();
-        Ok(LaggedFilter::new(self.kernel(kind)?, lag_s))
+        Ok(LaggedFilter::new(self.kernel()?, lag_s))
     }
 
     /// Builds a filter that resumes from a stored one of the same sensor and options, to the bit. R₀ and known strains come
@@ -313,13 +311,14 @@ impl<'a> FilterBuilder<'a> {
     }
 
     /// Builds the forward filter, with its conversion to rows.
-    fn kernel(self, kind: EstimatorKind) -> Result<Kernel, Error> {
+    fn kernel(self) -> Result<Kernel, Error> {
+        let kind = self.kind();
         let mut filter = self.sensor.build(kind, &self.options()?)?;
         let scale = self.scale()?;
         if let Some(measured) = self.rest_resistance {
             filter.rest(measured).map_err(Error::Step)?;
         }
-        let (known, errors) = (in_order(self.known, &scale)?, KnownErrors::new(scale.limits()));
+        let (known, errors) = (in_order(self.known, &scale)?, KnownErrors::new(scale.limits));
         let made_of = MadeOf {
             params: Arc::clone(self.sensor.shared()),
             options: StoredOptions::new(kind, self.gate, self.influence, self.protections),
@@ -355,18 +354,9 @@ impl<'a> FilterBuilder<'a> {
     }
 
     fn start_at(&self, strain: f64) -> Result<Start, Error> {
-        let (limits, quantity) = (self.sensor.params().limits, self.sensor.params().quantity);
-        let beyond = (limits.lower - strain).max(strain - limits.upper);
-        if beyond <= KNOWN_BEYOND * limits.span() {
-            return Ok(Start::Strain(strain));
-        }
-        Err(Error::KnownStrain {
-            name: "initial strain",
-            quantity,
-            lower: limits.lower,
-            upper: limits.upper,
-            found: strain,
-        })
+        let params = self.sensor.params();
+        check_known("initial strain", strain, params.limits, params.quantity)?;
+        Ok(Start::Strain(strain))
     }
 
     fn guard(&self) -> Result<Guard<f64>, Error> {

@@ -202,9 +202,8 @@ impl<'a> Calibration<'a> {
         }
         let mut calibration =
             ohmstrain_calib::calibrate(&samples, &self.structures(estimator), &[estimator], prior, progress)?;
-        let (distrusted, findings) = (mem::take(&mut calibration.distrusted), calibration.findings.clone());
-        let rest_readings = calibration.rest_readings.clone();
-        let left_out = mem::take(&mut calibration.left_out);
+        let (distrusted, left_out) = (mem::take(&mut calibration.distrusted), mem::take(&mut calibration.left_out));
+        let rest_readings = mem::take(&mut calibration.rest_readings);
         let info = |(recording, rest_reading): (&Recording, &f64)| {
             let (file, sha256) = recording.file.map(|(file, sha256)| (file.to_string(), sha256.to_string()))?;
             let (rows, time_s) = (recording.samples.len(), recording.samples.time_s());
@@ -214,6 +213,7 @@ impl<'a> Calibration<'a> {
         let infos = recordings.iter().zip(&rest_readings).filter_map(info).collect();
         let joint = recordings.iter().find_map(|recording| recording.joint);
         let params = calibration.into_sensor(MADE_BY, quantity, reading);
+        let findings = params.findings.clone();
         let (effect, confounded_temperature) =
             temperature.as_ref().map_or((None, None), |fit| (fit.effect, fit.confounded));
         let sensor = Sensor::from_params(SensorParams { joint, recordings: infos, temperature: effect, ..params })?;

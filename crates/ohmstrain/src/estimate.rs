@@ -118,7 +118,7 @@ pub(crate) struct Scale {
     pub rest_reading: f64,
     /// R₀ of the calibration, and the reading of the rested sensor then.
     calibrated: (f64, f64),
-    limits: (f64, f64),
+    pub limits: StrainRange<f64>,
     quantity: Quantity,
     joint: Option<Joint<f64>>,
     header: Header,
@@ -127,10 +127,8 @@ pub(crate) struct Scale {
 impl Scale {
     pub(crate) fn new(sensor: &Sensor) -> Result<Self, Error> {
         let params: &SensorParams = sensor.params();
-        let rest_reading = params.rest_reading;
+        let SensorParams { rest_reading, limits, quantity, .. } = *params;
         let calibrated = (rest_reading, params.rested());
-        let limits = (params.limits.lower, params.limits.upper);
-        let quantity = params.quantity;
         Ok(Self { rest_reading, calibrated, limits, quantity, joint: sensor.joint()?, header: Header::of(params) })
     }
 
@@ -142,22 +140,9 @@ impl Scale {
         Ok(())
     }
 
-    /// Returns the span of the strain's limits.
-    pub(crate) const fn span(&self) -> f64 {
-        self.limits.1 - self.limits.0
-    }
-
-    /// Returns the limits of the strain.
-    pub(crate) const fn limits(&self) -> StrainRange<f64> {
-        StrainRange { lower: self.limits.0, upper: self.limits.1 }
-    }
-
     /// Returns a known strain with standard deviation `sd`; refuses one far beyond the limits.
     pub(crate) fn known(&self, strain: f64, sd: f64) -> Result<Gaussian<f64>, Error> {
-        let ((lower, upper), quantity) = (self.limits, self.quantity);
-        if !((lower - strain).max(strain - upper) <= KNOWN_BEYOND * (upper - lower)) {
-            return Err(Error::KnownStrain { name: "known strain", quantity, lower, upper, found: strain });
-        }
+        check_known("known strain", strain, self.limits, self.quantity)?;
         if !(sd.is_finite() && sd > 0.0) {
             return Err(Error::NotPositive { name: "standard deviation of a known strain", found: sd });
         }
@@ -206,9 +191,23 @@ impl Scale {
             .with(Flag::Stuck, verdict == ReadingVerdict::Stuck)
             .with(Flag::Readmitted, verdict == ReadingVerdict::Readmitted)
             .with(Flag::RampBorder, output.estimate.near_ramp_border)
-            .with(Flag::AtLimit, strain <= self.limits.0 || strain >= self.limits.1)
+            .with(Flag::AtLimit, strain <= self.limits.lower || strain >= self.limits.upper)
             .and(output.doubts)
     }
+}
+
+/// Refuses a known strain that lies beyond the limits by more than a tenth of their span.
+pub(crate) fn check_known(
+    name: &'static str,
+    strain: f64,
+    limits: StrainRange<f64>,
+    quantity: Quantity,
+) -> Result<(), Error> {
+    let StrainRange { lower, upper } = limits;
+    if (lower - strain).max(strain - upper) <= KNOWN_BEYOND * limits.span() {
+        return Ok(());
+    }
+    Err(Error::KnownStrain { name, quantity, lower, upper, found: strain })
 }
 
 /// Refuses an R₀ that is too far from the reading `rested` of the rested sensor in calibration.

@@ -47,7 +47,7 @@ impl Kernel {
         self.rows.scale.rest_at(measured)?;
         self.filter.rest(measured).map_err(Error::Step)?;
         // Known errors belong to the former R₀.
-        self.rows.errors = KnownErrors::new(self.rows.scale.limits());
+        self.rows.errors = KnownErrors::new(self.rows.scale.limits);
         Ok(())
     }
 
@@ -65,7 +65,7 @@ impl Kernel {
         let StoredKernel { rest_reading, known, strains, filter } = stored;
         self.filter.resume(filter).map_err(|error| StoredError::Content(Box::new(error)))?;
         self.rows.scale.rest_reading = rest_reading;
-        self.rows.errors = KnownErrors::of(self.rows.scale.limits(), &strains);
+        self.rows.errors = KnownErrors::of(self.rows.scale.limits, &strains);
         self.known.extend(known.into_iter().map(Ahead::strain));
         self.known.make_contiguous().sort_by(|a, b| a.0.total_cmp(&b.0));
         Ok(())
@@ -91,7 +91,7 @@ impl Kernel {
 pub struct Filter {
     kernel: Kernel,
     /// Time and reading of the last row, and its output before known strains.
-    last: Option<(f64, Reading, Output)>,
+    last: Option<Last>,
 }
 
 impl Filter {
@@ -125,7 +125,7 @@ impl Filter {
             kernel.know(KnownStrain { time_s, known, estimated: output.estimate.strain });
             row = kernel.rows.known_row((time_s, reading), &output);
         }
-        self.last = Some((time_s, reading, output));
+        self.last = Some(Last { time_s, reading, output });
         Ok(row)
     }
 
@@ -149,7 +149,7 @@ impl Filter {
     pub fn know(&mut self, strain: f64, sd: f64) -> Result<Estimate, Error> {
         let kernel = &mut self.kernel;
         let known = kernel.rows.scale.known(strain, sd)?;
-        let Some((time_s, reading, output)) = self.last else {
+        let Some(Last { time_s, reading, output }) = self.last else {
             kernel.known.push_front((f64::NEG_INFINITY, known));
             return Ok(kernel.rows.scale.row(f64::NAN, Reading::MISSING, &kernel.filter.output()));
         };
@@ -176,8 +176,7 @@ impl Filter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn store(&self) -> Result<Stored, Error> {
-        let last = self.last.map(|(time_s, reading, output)| Last { time_s, reading, output });
-        Ok(Stored::new(&self.kernel.made_of, None, last, Vec::new(), self.kernel.store()?))
+        Ok(Stored::new(&self.kernel.made_of, None, self.last, Vec::new(), self.kernel.store()?))
     }
 
     /// Returns R₀ in the unit of the readings.
@@ -188,7 +187,7 @@ impl Filter {
     pub(crate) fn resume(&mut self, stored: &Stored) -> Result<(), Error> {
         stored.check(&self.kernel.made_of, None)?;
         self.kernel.resume(stored.kernel.clone())?;
-        self.last = stored.last.map(|Last { time_s, reading, output }| (time_s, reading, output));
+        self.last = stored.last;
         Ok(())
     }
 

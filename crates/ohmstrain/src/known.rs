@@ -40,7 +40,7 @@ impl Known {
     }
 
     pub(crate) fn checked(self, scale: &Scale) -> Result<(f64, Gaussian<f64>), Error> {
-        let sd = self.sd.unwrap_or_else(|| KNOWN_TO * scale.span());
+        let sd = self.sd.unwrap_or_else(|| KNOWN_TO * scale.limits.span());
         Ok((self.time_s, scale.known(self.strain, sd)?))
     }
 }

@@ -113,10 +113,9 @@ impl Moves {
         let range = self.quantile(2, 0.95) - self.quantile(2, 0.05);
         let strokes = pairs().map(|(_, moved)| moved).sum::<f64>() / range;
         let lasts_s = self.rows.last()?[0] - self.rows.first()?[0];
-        (!self.knows_clock && is_whole && step >= LEAST_STEP_S)
-            .then_some(())
-            .filter(|()| strokes >= FEWEST_STROKES && lasts_s / strokes > LONGEST_STROKE_S)
-            .map(|()| CalibrationDoubt::Milliseconds { recording, step, stroke_s: lasts_s / strokes })
+        let (stroke_s, has_strokes) = (lasts_s / strokes, strokes >= FEWEST_STROKES);
+        (!self.knows_clock && is_whole && step >= LEAST_STEP_S && has_strokes && stroke_s > LONGEST_STROKE_S)
+            .then_some(CalibrationDoubt::Milliseconds { recording, step, stroke_s })
     }
 }
 

@@ -104,7 +104,7 @@ impl FilterBuilder<'_> {
             };
             self.smooth_with(len, row, listen, |_, _| Ok::<(), Error>(()))?;
         }
-        Ok(KnownOfAll::new(scale.limits(), known.into_iter().map(|known| known.1).collect()))
+        Ok(KnownOfAll::new(scale.limits, known.into_iter().map(|known| known.1).collect()))
     }
 
     /// Smooths a recording; `known` receives row, time, s, and estimated strain, and returns the strain corrected by known

@@ -41,8 +41,7 @@ pub fn strain(recording: &PlottedRecording) -> Result<Option<Figure>, ReportErro
 /// Draws the recorded readings minus those of the law driven by the reference; `None` without a reference.
 pub fn reading(recording: &PlottedRecording) -> Result<Option<Figure>, ReportError> {
     let Some(driven) = &recording.driven else { return Ok(None) };
-    let residual: Vec<f64> =
-        recording.reading.iter().zip(&driven.reading).map(|(recorded, law)| recorded - law).collect();
+    let residual: Vec<f64> = recording.reading.iter().zip(driven).map(|(recorded, law)| recorded - law).collect();
     let sd = recording.law.model_error();
     let label = format!("{} less the law", recording.reading_label().replace("Resistance, Ω", "Ω: reading"));
     let y = Axis::around(&label, residual.iter().copied().chain([0.0]), [-2.0 * sd, 2.0 * sd], HIGH_TICKS - 1);

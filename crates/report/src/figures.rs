@@ -71,7 +71,7 @@ pub fn against_time<'a>(recording: &PlottedRecording<'a>, values: impl Iterator<
 pub fn reading(recording: &PlottedRecording) -> Result<Figure, ReportError> {
     let fitted: Vec<f64> = recording.filtered.iter().map(|row| recording.law.fitted(row)).collect();
     let (centre, sd) = match &recording.driven {
-        Some(driven) => (driven.reading.as_slice(), recording.law.model_error()),
+        Some(driven) => (driven.as_slice(), recording.law.model_error()),
         None => (fitted.as_slice(), recording.law.reading_noise()),
     };
     let bounds = || centre.iter().flat_map(|value| [value - 2.0 * sd, value + 2.0 * sd]);

@@ -7,6 +7,7 @@ use super::figures::{Figure, HIGH_TICKS};
 use super::ink::Ink;
 use super::motion::Hold;
 use super::recording::PlottedRecording;
+use super::thin::Point;
 use ohmstrain::number::plain;
 
 /// Share of a hold that is plotted.
@@ -14,19 +15,7 @@ const LAST: f64 = 0.99;
 
 /// Draws the longest holds on a logarithmic time axis; `None` without a hold.
 pub fn relaxation(recording: &PlottedRecording) -> Result<Option<Figure>, ReportError> {
-    let held: Vec<(Curve, &Hold)> =
-        recording.longest_holds().iter().filter_map(|hold| Some((Curve::new(recording, hold)?, hold))).collect();
-    let points = || held.iter().flat_map(|(curve, _)| &curve.recorded);
-    let Some((first, last)) = extent(points().map(|(time, _)| *time)) else { return Ok(None) };
-    let predicted = held.iter().flat_map(|(curve, _)| curve.predicted.iter().map(|(_, ratio)| *ratio));
-    let y = Axis::around("R / R at the hold's start", points().map(|(_, ratio)| *ratio), predicted, HIGH_TICKS);
-    let mut chart = Chart::new(WIDE, Axis::logarithmic("Time since the hold began, s", first, last), y);
-    let inks = Ink::HOLDS.into_iter().zip(Ink::HELD_LAWS);
-    for (place, ((curve, hold), (ink, law))) in held.iter().zip(inks).enumerate() {
-        let name = format!("{} held from {} s", recording.with_unit(hold.strain), plain(curve.start_s));
-        chart.line(ink, &name, curve.recorded.iter().copied());
-        chart.curve(law, if place == 0 { "law, in the same colours" } else { "" }, curve.predicted.iter().copied());
-    }
+    let Some(chart) = longest(recording, "R / R at the hold's start", <[_]>::to_vec) else { return Ok(None) };
     let note = if recording.truth.is_some() {
         "Solid: recorded. Dashed: the law, which knows the strain up to the hold and nothing of the readings in it."
     } else {
@@ -41,29 +30,37 @@ const PER_DECADE: f64 = 8.0;
 
 /// Draws the rate of the readings in the longest holds; `None` if there is no hold.
 pub fn rate(recording: &PlottedRecording) -> Result<Option<Figure>, ReportError> {
-    let held: Vec<(Curve, &Hold)> =
-        recording.longest_holds().iter().filter_map(|hold| Some((Curve::new(recording, hold)?, hold))).collect();
-    let rates: Vec<_> = held.iter().map(|(curve, _)| (slopes(&curve.recorded), slopes(&curve.predicted))).collect();
-    let recorded = || rates.iter().flat_map(|(recorded, _)| recorded);
-    let Some((first, last)) = extent(recorded().map(|(time, _)| *time)) else { return Ok(None) };
-    let predicted = rates.iter().flat_map(|(_, law)| law.iter().map(|(_, rate)| *rate));
-    let y = Axis::around("d(R/R at start)/dt, 1/s", recorded().map(|(_, rate)| *rate), predicted, HIGH_TICKS);
-    let mut chart = Chart::new(WIDE, Axis::logarithmic("Time since the hold began, s", first, last), y);
-    let inks = Ink::HOLDS.into_iter().zip(Ink::HELD_LAWS);
-    for (place, (((curve, hold), (recorded, predicted)), (ink, law))) in held.iter().zip(&rates).zip(inks).enumerate() {
-        let name = format!("{} held from {} s", recording.with_unit(hold.strain), plain(curve.start_s));
-        chart.line(ink, &name, recorded.iter().copied());
-        chart.curve(law, if place == 0 { "law, in the same colours" } else { "" }, predicted.iter().copied());
-    }
+    let Some(chart) = longest(recording, "d(R/R at start)/dt, 1/s", slopes) else { return Ok(None) };
     let note = "Slopes of straight lines through an eighth of a decade of readings each.";
     Figure::new(chart, "Rate of relaxation", note, false).map(Some)
 }
 
+/// Draws what `of` computes from the points of the longest holds, recorded and by the law.
+fn longest(recording: &PlottedRecording, label: &str, of: fn(&[Point]) -> Vec<Point>) -> Option<Chart> {
+    let of_hold = |hold: &Hold| {
+        let Curve { start_s, recorded, predicted } = Curve::new(recording, hold)?;
+        let name = format!("{} held from {} s", recording.with_unit(hold.strain), plain(start_s));
+        Some((name, of(&recorded), of(&predicted)))
+    };
+    let held: Vec<(String, Vec<Point>, Vec<Point>)> = recording.longest_holds().iter().filter_map(of_hold).collect();
+    let recorded = || held.iter().flat_map(|(_, recorded, _)| recorded);
+    let predicted = held.iter().flat_map(|(.., predicted)| predicted.iter().map(|(_, y)| *y));
+    let (first, last) = extent(recorded().map(|(time, _)| *time))?;
+    let y = Axis::around(label, recorded().map(|(_, y)| *y), predicted, HIGH_TICKS);
+    let mut chart = Chart::new(WIDE, Axis::logarithmic("Time since the hold began, s", first, last), y);
+    let inks = Ink::HOLDS.into_iter().zip(Ink::HELD_LAWS);
+    for (place, ((name, recorded, predicted), (ink, law))) in held.iter().zip(inks).enumerate() {
+        chart.line(ink, name, recorded.iter().copied());
+        chart.curve(law, if place == 0 { "law, in the same colours" } else { "" }, predicted.iter().copied());
+    }
+    Some(chart)
+}
+
 /// Returns the slopes of straight lines through parts of a decade, at the middle of their times.
-fn slopes(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+fn slopes(points: &[Point]) -> Vec<Point> {
     let part = |time: f64| (time.log10() * PER_DECADE).floor();
-    let known: Vec<(f64, f64)> = points.iter().copied().filter(|(time, y)| *time > 0.0 && y.is_finite()).collect();
-    let of_part = |points: &[(f64, f64)]| {
+    let known: Vec<Point> = points.iter().copied().filter(|(time, y)| *time > 0.0 && y.is_finite()).collect();
+    let of_part = |points: &[Point]| {
         let n = points.len() as f64;
         let (mean_t, mean_y) = points.iter().fold((0.0, 0.0), |sum, (t, y)| (sum.0 + t / n, sum.1 + y / n));
         let (sty, stt) = points
@@ -110,8 +107,8 @@ fn ends_of(recording: &PlottedRecording, hold: &Hold) -> Option<(f64, f64, f64)>
 /// Readings of a hold and of the law, relative to the first one.
 struct Curve {
     start_s: f64,
-    recorded: Vec<(f64, f64)>,
-    predicted: Vec<(f64, f64)>,
+    recorded: Vec<Point>,
+    predicted: Vec<Point>,
 }
 
 impl Curve {

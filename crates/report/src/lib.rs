@@ -232,9 +232,7 @@ impl<'a> Report<'a> {
     /// # Errors
     /// If the template cannot be filled; no input is known that does this.
     pub fn html(&self) -> Result<String, ReportError> {
-        let mut environment = Environment::new();
-        environment.add_template("report.html", PAGE)?;
-        Ok(environment.get_template("report.html")?.render(Serde(&self.page))?)
+        Ok(Environment::new().render_named_str("report.html", PAGE, Serde(&self.page))?)
     }
 
     /// Returns every plot as files of its own.
@@ -282,11 +280,9 @@ fn sections(recording: &PlottedRecording, innovations: &Innovations) -> Result<V
             sections.push(Section { folded: true, text, ..plain("Piece by piece", pieces) });
         }
         sections.push(sensor_behaviour(recording)?);
+        sections.push(consistency_of(recording, innovations)?);
     } else {
         sections.push(plain("The sensor", vec![relation::gauge(recording)?]));
-    }
-    if recording.time_s.iter().any(|time| time.is_finite()) {
-        sections.push(consistency_of(recording, innovations)?);
     }
     let tables = tables::parameters(recording.params, recording.rest_reading);
     sections.push(Section { folded: true, tables, ..plain("The sensor in numbers", vec![]) });

@@ -198,6 +198,17 @@ pub fn motions(time_s: &[f64], strain: &[f64], holds: &[Hold]) -> Vec<MotionKind
     motions
 }
 
+/// Returns the first and the last row of each movement.
+pub fn movements(motions: &[MotionKind]) -> Vec<(usize, usize)> {
+    let mut next = 0;
+    let rows = |motions: &[MotionKind]| {
+        let first = next;
+        next += motions.len();
+        (motions[0] != MotionKind::Hold).then_some((first, next - 1))
+    };
+    motions.chunk_by(|a, b| a == b).filter_map(rows).collect()
+}
+
 fn fill(motions: &mut [MotionKind], from: usize, until: usize, motion: Option<MotionKind>) {
     let until = until.min(motions.len());
     if let (Some(rows), Some(motion)) = (motions.get_mut(from..until), motion) {

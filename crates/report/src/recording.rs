@@ -1,5 +1,6 @@
 //! A recording with the data derived from it for the plots.
 
+use std::collections::BTreeMap;
 use std::ops::Deref;
 
 use ohmstrain::Estimate;
@@ -9,7 +10,7 @@ use super::ReportInput;
 use super::axis::extent;
 use super::law::{Driven, Law};
 use super::motion::{self, Hold, MotionKind};
-use ohmstrain::number::significant;
+use ohmstrain::number::{self, significant};
 
 /// Shortest hold whose relaxation is plotted, s.
 pub const SHORTEST_HOLD_S: f64 = 5.0;
@@ -27,11 +28,12 @@ pub struct PlottedRecording<'a> {
     pub law: Law<'a>,
     /// Motion of the strain, row by row.
     pub motions: Vec<MotionKind>,
-    /// The law driven by the reference.
-    pub driven: Option<Driven>,
+    /// Readings of the law driven by the reference.
+    pub driven: Option<Vec<f64>>,
     strain: Vec<f64>,
     held: Vec<Hold>,
-    held_driven: Driven,
+    /// States of the law's branches at the starts of the longest holds.
+    memories: BTreeMap<usize, Vec<f64>>,
 }
 
 impl<'a> Deref for PlottedRecording<'a> {
@@ -55,22 +57,16 @@ impl<'a> PlottedRecording<'a> {
         }
         let held = motion::levels_first(held);
         let starts: Vec<usize> = held.iter().take(PLOTTED_HOLDS).map(|hold| hold.first).collect();
-        let driven = law.driven(input.time_s, &strain, &starts);
-        let (driven, held_driven) = if truth.is_some() {
-            let memories = driven.memories.clone();
-            (Some(driven), Driven { reading: vec![], memories })
-        } else {
-            (None, driven)
-        };
+        let Driven { reading, memories } = law.driven(input.time_s, &strain, &starts);
         Self {
             input: input.clone(),
             truth,
             motions: motion::motions(input.time_s, &strain, &held),
             law,
-            driven,
+            driven: truth.map(|_| reading),
             strain,
             held,
-            held_driven,
+            memories,
         }
     }
 
@@ -91,7 +87,7 @@ impl<'a> PlottedRecording<'a> {
 
     /// Returns the state of the law's branches at the start of one of the longest holds.
     pub fn memory_at(&self, row: usize) -> Option<&[f64]> {
-        self.held_driven.memories.get(&row).map(Vec::as_slice)
+        self.memories.get(&row).map(Vec::as_slice)
     }
 
     /// Returns points (strain, g) of the gauge curve over a range.
@@ -132,10 +128,7 @@ impl<'a> PlottedRecording<'a> {
 
     /// Converts a value of the estimated quantity to the unit that people read: strain in percent.
     pub fn shown(&self, value: f64) -> f64 {
-        match self.params.quantity {
-            Quantity::Strain => 100.0 * value,
-            Quantity::AngleDeg => value,
-        }
+        number::shown(self.params.quantity).0 * value
     }
 
     /// Returns the axis label of the estimated quantity.

@@ -5,7 +5,7 @@ use super::axis::{Axis, extent};
 use super::chart::{Chart, HIGH, WIDE};
 use super::figures::{Figure, HIGH_TICKS};
 use super::ink::Ink;
-use super::motion::MotionKind;
+use super::motion::movements;
 use super::recording::PlottedRecording;
 use super::thin::Point;
 use ohmstrain::number::{plain, significant};
@@ -49,17 +49,7 @@ pub fn hysteresis(recording: &PlottedRecording) -> Result<Figure, ReportError> {
 
 /// Returns a step in the middle of each movement, or of some of them if there are many.
 fn arrows(recording: &PlottedRecording) -> Vec<(Point, Point)> {
-    let (motions, strain) = (&recording.motions, recording.known_strain());
-    let mut movements: Vec<(usize, usize)> = vec![];
-    let mut first = 0;
-    for row in 1..=motions.len() {
-        if motions.get(row) != motions.get(first) {
-            if motions.get(first).is_some_and(|motion| *motion != MotionKind::Hold) {
-                movements.push((first, row - 1));
-            }
-            first = row;
-        }
-    }
+    let (movements, strain) = (movements(&recording.motions), recording.known_strain());
     // An odd stride, so that both directions are included.
     let every = movements.len().div_ceil(MOST_ARROWS) | 1;
     let step = |(first, last): (usize, usize)| {
@@ -115,7 +105,7 @@ fn plain_slope(slope: f64) -> String {
 /// driven by the reference; empty without a reference.
 fn settled_readings(recording: &PlottedRecording) -> Vec<(f64, f64)> {
     let Some(driven) = &recording.driven else { return vec![] };
-    let rows = recording.known_strain().iter().zip(recording.reading).zip(&driven.reading);
+    let rows = recording.known_strain().iter().zip(recording.reading).zip(driven);
     let of_row = |((strain, reading), law): ((&f64, &f64), &f64)| {
         (*strain, (reading - law) / recording.rest_reading + recording.law.gauge(*strain))
     };

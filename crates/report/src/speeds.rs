@@ -5,7 +5,7 @@ use super::axis::{Axis, extent};
 use super::chart::{Chart, HIGH};
 use super::figures::{Figure, HIGH_TICKS};
 use super::ink::Ink;
-use super::motion::MotionKind;
+use super::motion;
 use super::recording::PlottedRecording;
 use ohmstrain::number::significant;
 
@@ -91,19 +91,10 @@ fn natural_classes(speeds: &[f64]) -> Vec<(f64, f64)> {
 }
 
 fn movements(recording: &PlottedRecording) -> Vec<Movement> {
-    let (motions, strain, time_s) = (&recording.motions, recording.known_strain(), recording.time_s);
+    let (strain, time_s) = (recording.known_strain(), recording.time_s);
     let Some((low, high)) = extent(strain.iter().copied()) else { return vec![] };
     let mut found = vec![];
-    let mut first = 0;
-    for row in 1..=motions.len() {
-        if motions.get(row) == motions.get(first) {
-            continue;
-        }
-        let (begin, last) = (first, row - 1);
-        first = row;
-        if motions[begin] == MotionKind::Hold || last <= begin {
-            continue;
-        }
+    for (begin, last) in motion::movements(&recording.motions).into_iter().filter(|(begin, last)| begin < last) {
         let known = |row: &usize| time_s.get(*row).zip(strain.get(*row)).is_some_and(|(_, x)| x.is_finite());
         let (Some(from), Some(to)) = ((begin..=last).find(known), (begin..=last).rfind(known)) else { continue };
         let way = (strain[to] - strain[from]).abs();

@@ -18,10 +18,7 @@ pub fn headline(recording: &PlottedRecording) -> String {
 }
 
 fn scored(scores: &Scores, recording: &PlottedRecording) -> String {
-    let what = match recording.params.quantity {
-        Quantity::Strain => "Strain",
-        Quantity::AngleDeg => "Angle",
-    };
+    let what = recording.quantity_name();
     let own = match recording.params.quantity {
         Quantity::Strain => format!("{} % strain", significant(100.0 * scores.rmse, 2)),
         Quantity::AngleDeg => format!("{}°", significant(scores.rmse, 2)),

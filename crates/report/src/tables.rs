@@ -4,6 +4,7 @@ use ohmstrain_model::{Gauge, StrainRange};
 use ohmstrain_sensor::{MotionParams, Quantity, ReadingUnit, SensorParams, Uncertainty};
 use serde::Serialize;
 
+use super::recording::Z_95;
 use super::{Sample, ScoreRow};
 use ohmstrain::number::{percent, plain, with_error};
 
@@ -90,9 +91,6 @@ pub fn parameters(params: &SensorParams, rest_reading: f64) -> Vec<Table> {
     }
     tables
 }
-
-/// Half-width of the 95 % interval of a standard normal.
-const Z_95: f64 = 1.96;
 
 /// Rows of a parameter table under construction.
 struct ParameterRows<'a> {

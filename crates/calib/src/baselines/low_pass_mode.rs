@@ -23,10 +23,7 @@ impl LowPassMode {
     /// If a recording is too short, the strain is constant or the readings do not vary.
     pub fn fit(recordings: &[Samples]) -> Result<Regression<Self>, CalibrationError> {
         let shortest_s = 3.0 * sampling_interval_s(recordings);
-        let longest_s = recordings
-            .iter()
-            .filter_map(|samples| Some(samples.time_s.last()? - samples.time_s.first()?))
-            .fold(0.0, f64::max);
+        let longest_s = recordings.iter().map(Samples::duration_s).fold(0.0, f64::max);
         let ratio = (0.25 * longest_s / shortest_s).max(1.0);
         let share = |i: usize| i as f64 / (TIME_CONSTANTS - 1) as f64;
         let candidates =

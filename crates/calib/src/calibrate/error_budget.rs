@@ -1,8 +1,7 @@
 use crate::law::fit::CrossFit;
-use crate::motion_stats::{REST_SHARE, moving_mean};
-use crate::order::{extent, median, sorted};
-use crate::samples::central_rate;
-use crate::samples::{Samples, filled_strain};
+use crate::motion_stats::{directions, moving_mean};
+use crate::order::median;
+use crate::samples::{Samples, central_rate, filled_strain, reading_range};
 use ohmstrain_sensor::ErrorBudget;
 
 /// Splits the error on held-out blocks into its shares.
@@ -37,8 +36,7 @@ pub(crate) fn error_budget(recordings: &[Samples], fit: &CrossFit, wrong: &Wrong
 
 /// Returns the range of the readings.
 fn range(samples: &Samples) -> f64 {
-    let known = samples.complete_rows().map(|k| samples.reading[k]);
-    let (low, high) = extent(known);
+    let (low, high) = reading_range(std::slice::from_ref(samples));
     high - low
 }
 
@@ -60,9 +58,7 @@ impl Direction {
     /// Returns the direction in every row of a recording.
     pub(crate) fn of_rows(samples: &Samples) -> Vec<Self> {
         let rate = moving_mean(&central_rate(samples.time_s, &filled_strain(samples)));
-        let speeds = sorted(rate.iter().map(|v| v.abs()));
-        let rest = REST_SHARE * speeds.get(speeds.len().saturating_sub(1) * 9 / 10).copied().unwrap_or(0.0);
-        rate.iter().map(|v| Self(i8::from(*v > rest) - i8::from(*v < -rest))).collect()
+        directions(&rate).into_iter().map(Self).collect()
     }
 }
 

@@ -171,11 +171,7 @@ impl Check<'_> {
 
     fn blocks(&self) -> Result<Vec<Scored>, CalibrationError> {
         let directions: Vec<Vec<Direction>> = self.recordings.iter().map(Direction::of_rows).collect();
-        let blocks: Vec<Result<Scored, CalibrationError>> = (0..self.fit.without_block.len())
-            .into_par_iter()
-            .map(|block| self.scored_block(block, &directions))
-            .collect();
-        blocks.into_iter().collect()
+        (0..self.fit.without_block.len()).into_par_iter().map(|block| self.scored_block(block, &directions)).collect()
     }
 
     fn scored_block(&self, block: usize, directions: &[Vec<Direction>]) -> Result<Scored, CalibrationError> {
@@ -188,14 +184,14 @@ impl Check<'_> {
             .map(|(samples, strain)| Samples { strain: strain.as_slice(), ..*samples })
             .collect();
         let cubic = fit_static_cubic(&training, limits)?;
-        let estimator = self.estimator_without(law, &training)?;
+        let (estimator, learned) = self.estimator_without(law, &training)?;
         let mut scored = Scored::default();
         for (r, samples) in self.recordings.iter().enumerate() {
             let rows = self.fit.blocks[r][block].clone();
             let readings = relative_changes(samples.reading, law.rest_readings[r]);
             let failed = |row: usize, source| CalibrationError::Filter { time_s: samples.time_s[row], source };
-            let mut filter = estimator.filter.filter(estimator.learned.as_ref())?;
-            let mut smoother = estimator.smoother.smoother(estimator.learned.as_ref())?;
+            let mut filter = estimator.filter(learned.as_ref())?;
+            let mut smoother = estimator.smoother(learned.as_ref())?;
             let smoothed = smoother.smooth(samples.time_s, &readings).map_err(|(row, e)| failed(row, e))?;
             let mut baseline = running_cubic(cubic);
             let mut of_recording = Scored::default();
@@ -232,27 +228,20 @@ impl Check<'_> {
         strain
     }
 
-    /// Returns filter and smoother under that law, and their correction, learned from the strains of `training` alone.
-    fn estimator_without<'b>(&self, law: &'b LawFit, training: &[Samples]) -> Result<Trained<'b>, CalibrationError> {
-        let limits = self.fit.law.law.range;
-        let recipe = |kind: EstimatorKind| {
-            let params = self.estimators.get(&kind).ok_or(SensorError::from(NoParameters { kind }))?;
-            Ok::<_, CalibrationError>(FilterParts::of_law(kind, &law.law, *params, limits))
-        };
-        let filter = recipe(self.filter)?;
+    /// Returns the recipe of filter and smoother under that law, and their correction, learned from the strains of `training` alone.
+    fn estimator_without<'b>(
+        &self,
+        law: &'b LawFit,
+        training: &[Samples],
+    ) -> Result<(FilterParts<'b>, Option<Arc<Learned>>), CalibrationError> {
+        let (kind, limits) = (self.filter, self.fit.law.law.range);
+        let params = self.estimators.get(&kind).ok_or(SensorError::from(NoParameters { kind }))?;
+        let recipe = FilterParts::of_law(kind, &law.law, *params, limits);
         let correction = if self.kind == EstimatorKind::Corrected {
-            fit_correction(training, law, limits, (self.filter, filter), self.of_make)?
+            fit_correction(training, law, limits, (kind, recipe), self.of_make)?
         } else {
             None
         };
-        let learned = correction.map(|correction| Learned::new(&correction, limits));
-        Ok(Trained { filter, smoother: recipe(self.filter)?, learned })
+        Ok((recipe, correction.map(|correction| Learned::new(&correction, limits))))
     }
-}
-
-/// Recipes of filter and smoother, and their learned correction.
-struct Trained<'a> {
-    filter: FilterParts<'a>,
-    smoother: FilterParts<'a>,
-    learned: Option<Arc<Learned>>,
 }

@@ -40,8 +40,8 @@ use crate::recording::turns::longest_unturned_s;
 use crate::samples::{Samples, reading_range};
 use ohmstrain_model::StrainRange;
 use ohmstrain_sensor::{
-    CorrectionParams, EstimatorKind, EstimatorParams, FORMAT, FilterParts, Findings, LawParams, Quantity, ReadingUnit,
-    SensorParams, Sessions, StaticCubic, Summary, Uncertainty, Unstated, Validity,
+    CorrectionParams, EstimatorKind, EstimatorParams, FORMAT, FilterParts, Quantity, ReadingUnit, SensorParams,
+    Summary, Validity,
 };
 
 /// Stage of a calibration, for a progress bar.
@@ -63,36 +63,13 @@ pub enum Stage {
 /// A calibrated sensor, before it is written down.
 #[derive(Clone, Debug)]
 pub struct Calibration {
+    /// Parameters of the sensor, but for those that [`into_sensor`](Self::into_sensor) is given.
+    pub(crate) params: SensorParams,
     /// Rows of the recordings that were left out because they are far from their neighbours or from the law.
     pub distrusted: Vec<Distrusted>,
-    /// The law.
-    pub law: LawParams,
     /// R₀ of each recording.
     pub rest_readings: Vec<f64>,
-    /// Reading of the rested sensor over R₀, if a recording begins at rest.
-    pub rest_share: Option<f64>,
-    /// Uncertainty of the law's parameters given the recordings, without the ridge, as in [`identifiability`]; `None` if the parameters are
-    /// not determined without it.
-    pub uncertainty: Option<Uncertainty>,
-    /// Estimator with the best score.
-    pub default_estimator: EstimatorKind,
-    /// Noise and motion, per estimator.
-    pub estimators: BTreeMap<EstimatorKind, EstimatorParams>,
-    /// Learned correction of the filter, if one was asked for.
-    pub correction: Option<CorrectionParams>,
-    /// The range of the reference.
-    pub limits: StrainRange<f64>,
-    /// Calibrated range.
-    pub validity: Validity,
-    /// Differences between recordings; `None` unless several begin at rest.
-    pub sessions: Option<Sessions>,
-    /// The static inverse fitted to the same rows.
-    pub static_cubic: StaticCubic,
-    /// Errors on held-out parts that the estimators do not state.
-    pub unstated: Unstated,
-    /// Quality on held-out parts; `None` if they cannot be estimated.
-    pub findings: Option<Findings>,
-    /// The rows of those parts; none if they cannot be estimated.
+    /// The rows of held-out parts; none if these cannot be estimated.
     pub left_out: Vec<LeftOutRow>,
 }
 
@@ -101,31 +78,7 @@ impl Calibration {
     /// determine (a joint, names and hashes of recordings) are left empty.
     #[must_use]
     pub fn into_sensor(self, made_by: &str, quantity: Quantity, reading: ReadingUnit) -> SensorParams {
-        let rest_reading = median_rest(&self.rest_readings);
-        SensorParams {
-            format: FORMAT,
-            made_by: made_by.into(),
-            quantity,
-            reading,
-            rest_reading,
-            measured_rest: self.rest_share.map(|share| share * rest_reading),
-            default_estimator: self.default_estimator,
-            summary: self.findings.as_ref().map(Summary::from),
-            tested: None,
-            limits: self.limits,
-            validity: self.validity,
-            sessions: self.sessions,
-            unstated: self.unstated,
-            temperature: None,
-            static_cubic: self.static_cubic,
-            joint: None,
-            law: self.law,
-            estimators: self.estimators,
-            recordings: vec![],
-            uncertainty: self.uncertainty,
-            findings: self.findings,
-            correction: self.correction,
-        }
+        SensorParams { made_by: made_by.into(), quantity, reading, ..self.params }
     }
 }
 
@@ -186,8 +139,8 @@ fn calibrate_arranged(
     let wanted = asked.all();
     let mut estimators = BTreeMap::new();
     for kind in EstimatorKind::distinct(wanted.iter().copied().chain([EstimatorKind::Ekf])) {
-        let problem =
-            NoiseProblem::new(recordings, fit, stats, kind).with_prior(prior.and_then(|prior| prior.estimator(kind)));
+        let problem = NoiseProblem::new(recordings, fit, stats, kind)
+            .with_prior(prior.and_then(|prior| prior.estimators.get(&kind)));
         let params = refined(&problem, kind, &asked, (fit, &surveyed), &mut || steps.evaluated())?;
         estimators.insert(kind, params);
     }
@@ -219,24 +172,34 @@ fn calibrate_arranged(
         let Checked { findings, unstated, rows } = checked;
         (unstated, Some(findings), rows)
     });
+    let rest_readings = fit.law.rest_readings.clone();
+    let rest_reading = median_rest(&rest_readings);
     let own = validity(recordings, &fit.law, limits, &stats);
-    Ok(Calibration {
-        distrusted: screened.distrusted.clone(),
+    let params = SensorParams {
+        format: FORMAT,
+        made_by: String::new(),
+        quantity: Quantity::Strain,
+        reading: ReadingUnit::Ohm,
+        rest_reading,
+        measured_rest: rest_share(recordings, &rest_readings, limits.span()).map(|share| share * rest_reading),
         default_estimator,
-        unstated,
-        findings,
-        left_out,
-        estimators,
-        correction,
-        static_cubic: fit_static_cubic(recordings, limits)?,
-        validity: prior.map_or(own, |prior| prior.joined(own, median_rest(&fit.law.rest_readings))),
+        summary: findings.as_ref().map(Summary::from),
+        tested: None,
         limits,
-        uncertainty: identifiability.map(|found| found.off_bounds()),
-        rest_share: rest_share(recordings, &fit.law.rest_readings, limits.span()),
-        sessions: sessions(recordings, &fit.law.rest_readings, limits.span()),
-        rest_readings: fit.law.rest_readings.clone(),
+        validity: prior.map_or(own, |prior| prior.joined(own, rest_reading)),
+        sessions: sessions(recordings, &rest_readings, limits.span()),
+        unstated,
+        temperature: None,
+        static_cubic: fit_static_cubic(recordings, limits)?,
+        joint: None,
         law: fit.law.law.clone(),
-    })
+        estimators,
+        recordings: vec![],
+        uncertainty: identifiability.map(|found| found.off_bounds()),
+        findings,
+        correction,
+    };
+    Ok(Calibration { params, distrusted: screened.distrusted.clone(), rest_readings, left_out })
 }
 
 /// Estimators that a calibration tries.
@@ -353,7 +316,7 @@ fn survey_all<'a>(
 ) -> Result<Vec<Surveyed<'a>>, CalibrationError> {
     let mut surveyed: Vec<Surveyed<'a>> = Vec::new();
     for kind in asked.all().into_iter().filter(|kind| asked.first_before(*kind).is_none()) {
-        let of_make = prior.and_then(|prior| prior.estimator(kind));
+        let of_make = prior.and_then(|prior| prior.estimators.get(&kind));
         surveyed.extend(survey(recordings, laws, stats, (kind, of_make), &mut *evaluated)?);
     }
     Ok(surveyed)

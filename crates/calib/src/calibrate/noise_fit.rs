@@ -61,7 +61,7 @@ pub(crate) fn survey_evaluations(laws: usize) -> u64 {
 const ERROR_TIMES: [f64; 5] = [0.0, 0.25, 1.0, 4.0, 16.0];
 
 /// Number of rows on which the smoother's intervals are checked; smoothing costs ten times as much as filtering.
-pub(crate) const SMOOTHED_ROWS: usize = 2000;
+const SMOOTHED_ROWS: usize = 2000;
 /// First guess of the baseline's correlation time, s.
 const BASELINE_TIME_S: f64 = 8.0;
 /// First guess of white noise and branch noise, as a fraction of the law's residual.
@@ -151,7 +151,7 @@ impl<'a> NoiseProblem<'a> {
         let mut cost = |point: &[f64]| {
             evaluated();
             let params = self.params(point);
-            let score = left_out.score(&|fold| self.recipe(self.kind, fold, params).in_longer_steps(step_factor));
+            let score = left_out.score(&|fold| self.recipe(fold, params).in_longer_steps(step_factor));
             score + self.pull(point)
         };
         let from = from.unwrap_or(&self.untuned);
@@ -186,7 +186,7 @@ impl<'a> NoiseProblem<'a> {
         let as_made = self.of_make.map(|_| self.params(&refined));
         let mut best = (f64::INFINITY, self.params(&refined));
         for params in alike.chain(as_made).chain([self.params(&self.untuned)]) {
-            let score = every_row.score(&|fold| self.recipe(self.kind, fold, params));
+            let score = every_row.score(&|fold| self.recipe(fold, params));
             if score < best.0 {
                 best = (score, params);
             }
@@ -207,9 +207,8 @@ impl<'a> NoiseProblem<'a> {
     fn finish(&self, left_out: &LeftOut, params: EstimatorParams, score: f64) -> EstimatorParams {
         // A short motion shows fewer of the possible errors.
         let of_make = self.of_make.map_or(1.0, |prior| prior.strain_sd_scale);
-        let filtered = left_out.filtered_deviations(&|fold| self.recipe(self.kind, fold, params));
-        let smoothed =
-            self.left_out(self.stride(SMOOTHED_ROWS)).smoothed_deviations(&|fold| self.recipe(self.kind, fold, params));
+        let filtered = left_out.filtered_deviations(&|fold| self.recipe(fold, params));
+        let smoothed = self.left_out(self.stride(SMOOTHED_ROWS)).smoothed_deviations(&|fold| self.recipe(fold, params));
         EstimatorParams {
             score,
             strain_sd_scale: filtered.map_or(1.0, |deviations| sd_scale(&deviations)).max(of_make),
@@ -223,22 +222,23 @@ impl<'a> NoiseProblem<'a> {
     fn settling(&self, left_out: &LeftOut, params: EstimatorParams) -> Option<Settling<f64>> {
         let holds = LongHolds::new(self.samples, self.limits.span())?;
         let params = EstimatorParams { settling: Some(holds.law()), ..params };
-        holds.settling(left_out, &|fold| self.recipe(self.kind, fold, params))
+        holds.settling(left_out, &|fold| self.recipe(fold, params))
     }
 
-    fn recipe<'f>(&self, kind: EstimatorKind, fold: Fold<'f>, params: EstimatorParams) -> FilterParts<'f> {
-        FilterParts::of_law(kind, fold.law, params, self.limits)
+    fn recipe<'f>(&self, fold: Fold<'f>, params: EstimatorParams) -> FilterParts<'f> {
+        FilterParts::of_law(self.kind, fold.law, params, self.limits)
     }
 
     fn left_out(&self, stride: usize) -> LeftOut<'a> {
         LeftOut::new(self.samples, self.fit, self.limits, stride)
     }
 
+    /// Returns the stride that leaves no more than `rows` rows.
     fn stride(&self, rows: usize) -> usize {
-        stride(self.samples, rows)
+        self.samples.iter().map(Samples::len).sum::<usize>().div_ceil(rows)
     }
 
-    /// Returns the point that the law's residuals and the motion of the strain suggest.
+    /// Returns the point that the law's residuals and the motion of the strain suggest, in the order in which `params` reads it.
     fn start(&self) -> Vec<f64> {
         let mut left_out = Vec::new();
         for (block, law) in self.fit.without_block.iter().enumerate() {
@@ -253,49 +253,41 @@ impl<'a> NoiseProblem<'a> {
             EstimatorKind::Imm | EstimatorKind::Hypotheses => (0.5 * stats.speed, 3.0 * stats.strain_sd),
             _ => (stats.rate_sd, stats.strain_sd),
         };
-        let phases = self.kind.has_phases().then(|| PhaseValues {
-            hold_time_s: stats.hold_s.unwrap_or(0.5),
-            move_time_s: stats.move_s,
-            speed_per_s: stats.speed.max(1e-12),
-            tempering: TEMPERING,
-        });
-        let values = Values {
-            baseline_sd: root_mean_square(&left_out).max(1e-9),
-            baseline_time_s: BASELINE_TIME_S,
-            reading_sd: fine,
-            branch_sd: fine,
-            rate_sd_per_s,
-            rate_time_s: stats.rate_time_s,
-            strain_sd,
-            phases,
-        };
-        values.point()
+        let mut values = vec![root_mean_square(&left_out).max(1e-9), BASELINE_TIME_S, fine, fine];
+        values.extend([rate_sd_per_s, stats.rate_time_s, strain_sd]);
+        if self.kind.has_phases() {
+            values.extend([stats.hold_s.unwrap_or(0.5), stats.move_s, stats.speed.max(1e-12), TEMPERING]);
+        }
+        values.into_iter().map(f64::ln).collect()
     }
 
+    /// Returns the parameters at a point, the logarithms of their values; missing values are NaN.
     fn params(&self, point: &[f64]) -> EstimatorParams {
-        let values = Values::of(point);
+        let mut values = point.iter().map(|x| x.clamp(-25.0, 15.0).exp());
+        let mut next = |_| values.next().unwrap_or(f64::NAN);
+        let of_all: [f64; OF_ALL] = std::array::from_fn(&mut next);
+        let [baseline_sd, baseline_time_s, reading_sd, branch_sd, rate_sd_per_s, rate_time_s, strain_sd] = of_all;
         let strain_mean = self.of_make.map_or(self.stats.strain_mean, |prior| prior.strain_mean);
-        let kind = self.kind;
-        let Values { rate_sd_per_s, rate_time_s, strain_sd, .. } = values;
-        let motion = MotionParams { rate_sd_per_s, rate_time_s, strain_mean, strain_sd };
-        let phases = values.phases.map(|phases| PhaseParams {
-            hold_time_s: phases.hold_time_s,
-            move_time_s: phases.move_time_s,
-            reversal: match (self.of_make, kind, self.stats.hold_s) {
-                (Some(prior), ..) => prior.reversal,
-                (None, EstimatorKind::SignSplit, None) => 1.0,
-                _ => self.stats.reversal,
-            },
-            speed_per_s: if kind == EstimatorKind::SignSplit { 0.0 } else { phases.speed_per_s },
-            tempering: phases.tempering.min(1.0),
-        });
-        let Values { baseline_sd, baseline_time_s, reading_sd, branch_sd, .. } = values;
         let reading_time_s = self.of_make.map_or(0.0, |prior| prior.reading_time_s);
+        let phases = (point.len() > OF_ALL).then(|| {
+            let [hold_time_s, move_time_s, speed_per_s, tempering] = std::array::from_fn(next);
+            PhaseParams {
+                hold_time_s,
+                move_time_s,
+                reversal: match (self.of_make, self.kind, self.stats.hold_s) {
+                    (Some(prior), ..) => prior.reversal,
+                    (None, EstimatorKind::SignSplit, None) => 1.0,
+                    _ => self.stats.reversal,
+                },
+                speed_per_s: if self.kind == EstimatorKind::SignSplit { 0.0 } else { speed_per_s },
+                tempering: tempering.min(1.0),
+            }
+        });
         EstimatorParams {
             score: f64::NAN,
             strain_sd_scale: 1.0,
             smoothed_sd_scale: None,
-            motion,
+            motion: MotionParams { rate_sd_per_s, rate_time_s, strain_mean, strain_sd },
             noise: NoiseParams { baseline_sd, baseline_time_s, reading_sd, reading_time_s, branch_sd },
             phases,
             settling: None,
@@ -305,63 +297,3 @@ impl<'a> NoiseProblem<'a> {
 
 /// Number of values of a filter without phases.
 const OF_ALL: usize = 7;
-
-/// Parameters that a search finds, by name; their logarithms, in this order, are its point.
-struct Values {
-    baseline_sd: f64,
-    baseline_time_s: f64,
-    reading_sd: f64,
-    branch_sd: f64,
-    rate_sd_per_s: f64,
-    rate_time_s: f64,
-    strain_sd: f64,
-    /// Values of filters with phases.
-    phases: Option<PhaseValues>,
-}
-
-struct PhaseValues {
-    hold_time_s: f64,
-    move_time_s: f64,
-    speed_per_s: f64,
-    tempering: f64,
-}
-
-impl Values {
-    /// Reads a point of a search; missing values are NaN.
-    fn of(point: &[f64]) -> Self {
-        let mut values = point.iter().map(|x| x.clamp(-25.0, 15.0).exp());
-        let mut next = || values.next().unwrap_or(f64::NAN);
-        Self {
-            baseline_sd: next(),
-            baseline_time_s: next(),
-            reading_sd: next(),
-            branch_sd: next(),
-            rate_sd_per_s: next(),
-            rate_time_s: next(),
-            strain_sd: next(),
-            phases: (point.len() > OF_ALL).then(|| PhaseValues {
-                hold_time_s: next(),
-                move_time_s: next(),
-                speed_per_s: next(),
-                tempering: next(),
-            }),
-        }
-    }
-
-    /// Returns the point of a search at these values.
-    fn point(&self) -> Vec<f64> {
-        let Self { baseline_sd, baseline_time_s, reading_sd, branch_sd, rate_sd_per_s, rate_time_s, strain_sd, phases } =
-            self;
-        let of_all: [_; OF_ALL] =
-            [baseline_sd, baseline_time_s, reading_sd, branch_sd, rate_sd_per_s, rate_time_s, strain_sd];
-        let of_phases = phases.iter().flat_map(|PhaseValues { hold_time_s, move_time_s, speed_per_s, tempering }| {
-            [hold_time_s, move_time_s, speed_per_s, tempering]
-        });
-        of_all.into_iter().chain(of_phases).map(|x| x.ln()).collect()
-    }
-}
-
-/// Returns the stride that leaves no more than `rows` rows.
-pub(crate) fn stride(samples: &[Samples], rows: usize) -> usize {
-    samples.iter().map(Samples::len).sum::<usize>().div_ceil(rows)
-}

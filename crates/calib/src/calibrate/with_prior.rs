@@ -38,7 +38,8 @@ pub fn calibrate(
     if prior.is_none_or(|prior| longest_s < ALONE * prior.validity.duration_s) {
         return with_prior;
     }
-    let error = |made: &Calibration| made.findings.as_ref().map_or(f64::INFINITY, |findings| findings.filter.rmse);
+    let error =
+        |made: &Calibration| made.params.findings.as_ref().map_or(f64::INFINITY, |findings| findings.filter.rmse);
     match (with_prior, calibrate_once(recordings, structures, kinds, None, progress)) {
         (Ok(with_prior), Ok(alone)) => Ok(if error(&alone) < error(&with_prior) { alone } else { with_prior }),
         (Ok(with_prior), Err(_)) => Ok(with_prior),

@@ -246,9 +246,7 @@ impl RecordingRows {
 /// its filter confuses stretching with releasing.
 fn tau_bounds(samples: &[Samples]) -> (f64, f64) {
     let stats = MotionStats::new(samples);
-    let intervals = samples
-        .iter()
-        .map(|samples| (samples.time_s[samples.len() - 1] - samples.time_s[0]) / (samples.len() - 1) as f64);
+    let intervals = samples.iter().map(|samples| samples.duration_s() / (samples.len() - 1) as f64);
     let shortest = stats.rate_time_s.max(3.0 * intervals.fold(0.0, f64::max));
     (shortest, (0.25 * stats.longest_s).max(8.0 * shortest))
 }

@@ -1,7 +1,5 @@
 use ohmstrain_ekf::Belief;
-use ohmstrain_model::{
-    Branch, Gauge, ModelNoise, Motion, ParameterError, Scalar, SensorLaw, StrainRange, SwitchedModel,
-};
+use ohmstrain_model::{ModelNoise, Motion, ParameterError, Scalar, SensorLaw, SwitchedModel};
 
 use super::ModelFamily;
 use ohmstrain_sensor::{MotionParams, NoiseParams};
@@ -78,23 +76,6 @@ impl<const B: usize> SensorFamily<'_, B> {
         }
     }
 
-    fn law<T: Scalar>(&self) -> SensorLaw<T, B> {
-        let law = &self.law;
-        SensorLaw {
-            gauge: in_numbers(&law.gauge),
-            extend_viscosity_s: T::of(law.extend_viscosity_s),
-            retract_viscosity_s: T::of(law.retract_viscosity_s),
-            branches: law.branches.map(|branch| Branch {
-                tau_s: T::of(branch.tau_s),
-                extend_gain: T::of(branch.extend_gain),
-                retract_gain: T::of(branch.retract_gain),
-                extend_gain_slope: T::of(branch.extend_gain_slope),
-                retract_gain_slope: T::of(branch.retract_gain_slope),
-            }),
-            range: StrainRange { lower: T::of(law.range.lower), upper: T::of(law.range.upper) },
-        }
-    }
-
     /// Returns the motion. Mean and standard deviation of strain are fixed: they set the scale against which readings
     /// are judged.
     fn motion<T: Scalar>(&self, values: &[T]) -> Result<Motion<T>, ParameterError> {
@@ -105,23 +86,11 @@ impl<const B: usize> SensorFamily<'_, B> {
     }
 }
 
-fn in_numbers<T: Scalar>(gauge: &Gauge<f64>) -> Gauge<T> {
-    match *gauge {
-        Gauge::Polynomial { coefficients } => Gauge::Polynomial { coefficients: coefficients.map(T::of) },
-        Gauge::DecayingExponential { slope, decay_strain } => {
-            Gauge::DecayingExponential { slope: T::of(slope), decay_strain: T::of(decay_strain) }
-        }
-        Gauge::Tunnelling { gap, barrier, path_loss } => {
-            Gauge::Tunnelling { gap: T::of(gap), barrier: T::of(barrier), path_loss: T::of(path_loss) }
-        }
-    }
-}
-
 impl<const B: usize, const N: usize, const L: usize> ModelFamily<N, L> for SensorFamily<'_, B> {
     type Model<T: Scalar> = SwitchedModel<T, B, N>;
 
     fn model<T: Scalar>(&self, values: &[T]) -> Result<Self::Model<T>, ParameterError> {
-        SwitchedModel::new(self.law(), self.motion(values)?, self.noise(values))
+        SwitchedModel::new(self.law.to(), self.motion(values)?, self.noise(values))
     }
 
     fn start<T: Scalar>(&self, model: &Self::Model<T>) -> Belief<T, N, L> {

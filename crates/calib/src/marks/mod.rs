@@ -91,7 +91,7 @@ fn score(recordings: &[Samples], motions: &[MarkedMotion]) -> Result<f64, Calibr
     let samples: Vec<Samples> =
         recordings.iter().zip(&strains).map(|(samples, strain)| Samples { strain, ..*samples }).collect();
     let calibration = calibrate_once(&samples, &[LawOptions::default()], &[EstimatorKind::Ekf], None, |_| {})?;
-    calibration.estimators.get(&EstimatorKind::Ekf).map(|params| params.score).ok_or(CalibrationError::Singular)
+    calibration.params.estimators.get(&EstimatorKind::Ekf).map(|params| params.score).ok_or(CalibrationError::Singular)
 }
 
 fn reference(

@@ -53,11 +53,6 @@ pub struct Prior {
 }
 
 impl Prior {
-    /// Returns the prior of an estimator's noise and motion.
-    pub(crate) fn estimator(&self, kind: EstimatorKind) -> Option<&EstimatorPrior> {
-        self.estimators.get(&kind)
-    }
-
     /// Returns the calibrated range of a sensor with this R₀, joined with that of the others.
     pub(crate) fn joined(&self, own: Validity, rest_reading: f64) -> Validity {
         let of_make = &self.validity;

@@ -42,7 +42,7 @@ impl Around<'_> {
         let text: Vec<String> = match lists {
             None => all.iter().map(Printed::text).collect(),
             Some(lists) => {
-                let kept = self.kept();
+                let Declared { kept, .. } = self.declared();
                 all.iter().map(|printed| printed.either(&kept, lists)).collect()
             }
         };
@@ -53,11 +53,6 @@ impl Around<'_> {
     pub fn fields(&self) -> Vec<String> {
         let Declared { numbers, truths, .. } = self.declared();
         numbers.into_iter().chain(truths).collect()
-    }
-
-    /// Returns the names of these fields.
-    fn kept(&self) -> Kept {
-        self.declared().kept
     }
 
     fn declared(&self) -> Declared {

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use ohmstrain_ekf::record::{Function, Name, Operation, Writer, write_down};
+use ohmstrain_ekf::record::{Function, Name, Operation, Place, Writer, write_down};
 
 use super::body::Body;
 use super::listed::{Lists, Slot, list};
@@ -35,51 +35,84 @@ impl Printed {
     pub fn text(&self) -> String {
         let Function { inputs, results, recorded } = &self.function;
         let name_of = |input: usize| inputs.get(input).map_or_else(String::new, in_c);
-        let is_kept = |name: &Name, place: usize| match recorded.operations[place] {
-            Operation::Input(input) | Operation::Flag(input) => inputs.get(input) == Some(name),
-            _ => false,
-        };
         let mut body = Body::new(recorded, &name_of);
-        let (mut written, mut returned, mut flags, mut kind) = (String::new(), None, Vec::new(), "void");
-        let (mut changes, mut outputs) = (false, Vec::new());
+        let (mut ends, mut changes) = (Ends::default(), false);
         for (name, place) in results.iter().zip(&recorded.results) {
             let is_truth = body.is_truth(*place);
             match name {
-                Name::Field(_) if is_kept(name, *place) => {}
+                Name::Field(_) if self.is_kept(name, *place) => {}
                 Name::Field(_) => {
                     changes = true;
-                    let target = in_c(name);
-                    let value = body.value(*place);
-                    let _ = writeln!(written, "    {target} = {value};");
+                    let (target, value) = (in_c(name), body.value(*place));
+                    let _ = writeln!(ends.written, "    {target} = {value};");
                 }
-                Name::Own(own) if own == RETURNED => {
-                    kind = if is_truth { "int" } else { "float" };
-                    returned = Some(body.value(*place));
-                }
-                Name::Own(own) if own.starts_with(FLAG) => {
-                    kind = "unsigned";
-                    flags.push(format!("({} ? (unsigned){own} : 0u)", body.atom(*place)));
-                }
-                Name::Own(own) => {
-                    outputs.push(format!("{} *{own}", if is_truth { "int" } else { "float" }));
-                    let value = body.value(*place);
-                    let _ = writeln!(written, "    *{own} = {value};");
-                }
+                Name::Own(own) if own.starts_with(FLAG) => ends.add(own, is_truth, &body.atom(*place)),
+                Name::Own(own) => ends.add(own, is_truth, &body.value(*place)),
             }
         }
-        if !flags.is_empty() {
-            returned = Some(flags.join(" |\n           "));
-        }
-        let returns = returned.map_or_else(String::new, |value| format!("    return {value};\n"));
         let has_state = inputs.iter().any(|name| matches!(name, Name::Field(_))) || changes;
-        let parameters = self.declared(has_state, changes, outputs);
-        let body = format!("{}{written}{returns}", body.lines);
+        let before = std::mem::take(&mut body.lines);
+        self.defined(before, ends, has_state, changes)
+    }
+
+    /// True if a result is a field that remains as it is.
+    fn is_kept(&self, name: &Name, place: Place) -> bool {
+        let Function { inputs, recorded, .. } = &self.function;
+        match recorded.operations[place] {
+            Operation::Input(input) | Operation::Flag(input) => {
+                matches!(name, Name::Field(_)) && inputs.get(input) == Some(name)
+            }
+            _ => false,
+        }
+    }
+
+    /// Returns the function with this body, at the end of which it writes and returns its results.
+    fn defined(&self, mut body: String, ends: Ends, has_state: bool, changes: bool) -> String {
+        let Ends { outputs, written, flags, returned } = ends;
+        let flags = (!flags.is_empty()).then(|| ("unsigned", flags.join(" |\n           ")));
+        body.push_str(&written);
+        let mut kind = "void";
+        if let Some((of_value, value)) = flags.or(returned) {
+            kind = of_value;
+            let _ = writeln!(body, "    return {value};");
+        }
+        let seen = if changes { "readings *seen" } else { "const readings *seen" };
+        let own = self.parameters.iter().map(|parameter| (*parameter).to_owned());
+        let parameters: Vec<String> =
+            has_state.then(|| seen.to_owned()).into_iter().chain(own).chain(outputs).collect();
         defined(self.comment, &format!("{kind} {}", self.name), &parameters, &body)
     }
 }
 
-/// Combines a function as a list and the compiled one.
-pub fn either(listed: &str, compiled: &str) -> String {
+/// Results of a function that are no fields.
+#[derive(Default)]
+struct Ends {
+    /// Parameters that results are written to, and the lines that write results.
+    outputs: Vec<String>,
+    written: String,
+    /// Flags of the function's value.
+    flags: Vec<String>,
+    /// Kind of its value, and the value.
+    returned: Option<(&'static str, String)>,
+}
+
+impl Ends {
+    fn add(&mut self, own: &str, is_truth: bool, value: &str) {
+        let kind = if is_truth { "int" } else { "float" };
+        if own == RETURNED {
+            self.returned = Some((kind, value.to_owned()));
+        } else if own.starts_with(FLAG) {
+            self.flags.push(format!("({value} ? (unsigned){own} : 0u)"));
+        } else {
+            self.outputs.push(format!("{kind} *{own}"));
+            let _ = writeln!(self.written, "    *{own} = {value};");
+        }
+    }
+}
+
+/// Combines a function as a list, if there is one, and the compiled one.
+pub fn either(listed: Option<String>, compiled: String) -> String {
+    let Some(listed) = listed else { return compiled };
     let listed = listed.replacen("\nstatic ", "\nAPART static ", 1);
     format!("#if OHMSTRAIN_LISTED\n{listed}#else\n{compiled}#endif\n")
 }
@@ -94,8 +127,7 @@ pub struct Kept {
 impl Printed {
     /// Returns the function as a list, if it is worth one, and compiled.
     pub fn either(&self, fields: &Kept, lists: &mut Lists) -> String {
-        let compiled = self.text();
-        self.listed(fields, lists).map_or_else(|| compiled.clone(), |listed| either(&listed, &compiled))
+        either(self.listed(fields, lists), self.text())
     }
 
     fn listed(&self, fields: &Kept, lists: &mut Lists) -> Option<String> {
@@ -114,18 +146,9 @@ impl Printed {
         };
         let slots: Vec<Slot> = inputs.iter().map(&mut slot).collect::<Option<_>>()?;
         let ends: Vec<Slot> = results.iter().map(&mut slot).collect::<Option<_>>()?;
-        let is_as_it_was = |name: &Name, place: usize| match recorded.operations[place] {
-            Operation::Input(input) | Operation::Flag(input) => {
-                matches!(name, Name::Field(_)) && inputs[input] == *name
-            }
-            _ => false,
-        };
-        let mut kept = Vec::new();
-        for ((name, place), end) in results.iter().zip(&recorded.results).zip(&ends) {
-            if !is_as_it_was(name, *place) {
-                kept.push((*place, *end));
-            }
-        }
+        let all = results.iter().zip(&recorded.results).zip(&ends);
+        let changed = all.filter(|((name, place), _)| !self.is_kept(name, **place));
+        let kept: Vec<_> = changed.map(|((_, place), end)| (*place, *end)).collect();
         let lists_of = list(lists, recorded, &|input| slots[input], &kept)?;
         let is_truth = |place: usize| Body::new(recorded, &|_| String::new()).is_truth(place);
         let kind = |truth: bool| if truth { "truth" } else { "number" };
@@ -146,40 +169,14 @@ impl Printed {
             _ => "0, 0".to_owned(),
         };
         let _ = writeln!(body, "    run_list(OPERATIONS, CONSTANTS, {state}, 0, given);");
-        let (mut outputs, mut flags, mut returned, mut of_kind) = (Vec::new(), Vec::new(), None, "void");
+        let mut given = Ends::default();
         for ((name, place), end) in results.iter().zip(&recorded.results).zip(&ends) {
-            let (Slot::Given(at), truth) = (end, is_truth(*place)) else { continue };
-            match name {
-                Name::Field(_) => {}
-                Name::Own(own) if own == RETURNED => {
-                    of_kind = if truth { "int" } else { "float" };
-                    returned = Some(format!("given[{at}].{}", kind(truth)));
-                }
-                Name::Own(own) if own.starts_with(FLAG) => {
-                    of_kind = "unsigned";
-                    flags.push(format!("(given[{at}].truth ? (unsigned){own} : 0u)"));
-                }
-                Name::Own(own) => {
-                    outputs.push(format!("{} *{own}", if truth { "int" } else { "float" }));
-                    let _ = writeln!(body, "    *{own} = given[{at}].{};", kind(truth));
-                }
+            if let (Name::Own(own), Slot::Given(at)) = (name, end) {
+                let truth = is_truth(*place);
+                given.add(own, truth, &format!("given[{at}].{}", kind(truth)));
             }
         }
-        if !flags.is_empty() {
-            returned = Some(flags.join(" |\n           "));
-        }
-        if let Some(returned) = returned {
-            let _ = writeln!(body, "    return {returned};");
-        }
-        let parameters = self.declared(has_state, changes, outputs);
-        Some(defined(self.comment, &format!("{of_kind} {}", self.name), &parameters, &body))
-    }
-
-    /// Declares the parameters in C.
-    fn declared(&self, has_state: bool, changes: bool, outputs: Vec<String>) -> Vec<String> {
-        let seen = if changes { "readings *seen" } else { "const readings *seen" };
-        let own = self.parameters.iter().map(|parameter| (*parameter).to_owned());
-        has_state.then(|| seen.to_owned()).into_iter().chain(own).chain(outputs).collect()
+        Some(self.defined(body, given, has_state, changes))
     }
 }
 

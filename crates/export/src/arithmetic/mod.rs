@@ -280,9 +280,7 @@ fn printed(functions: &[&[Function]], state: (Carried, &[String]), record: impl 
 impl Function {
     /// Returns the function as a list, and compiled.
     fn either(&self, state: (Carried, &[String]), steps: &[usize], recorded: &Recorded, lists: &mut Lists) -> String {
-        let compiled = self.text(state, recorded);
-        self.listed(state.0, steps, recorded, lists)
-            .map_or_else(|| compiled.clone(), |listed| either(&listed, &compiled))
+        either(self.listed(state.0, steps, recorded, lists), self.text(state, recorded))
     }
 
     /// Returns the function as a list, if it is worth one. Only the numbers of a step with these indices are available.

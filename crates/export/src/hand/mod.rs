@@ -5,11 +5,10 @@ mod fused;
 mod process;
 mod twin;
 
-use minijinja::value::Serde;
 use ohmstrain_sensor::fusion::FusionParams;
 use ohmstrain_sensor::{JointParams, Quantity, SensorParams};
 
-use crate::{ExportError, ExportTarget, Plan, Prefix, Promise, SourceFile, environment, files};
+use crate::{ExportError, ExportTarget, Plan, Prefix, Promise, SourceFile, files, filled};
 use constants::HandConstants;
 
 /// A joint with its channels.
@@ -96,12 +95,7 @@ impl HandFirmware {
             let all = files(channel.params, &plan, ExportTarget::C, dt_s, &part, &promise.lines).map_err(of_column)?;
             exported.extend(all.into_iter().filter(|file| file.path.starts_with("src/")));
         }
-        let mut environment = environment()?;
-        for (path, template) in TEMPLATES {
-            environment.add_template(path, template)?;
-            let content = environment.get_template(path)?.render(Serde(&hand))?;
-            exported.push(SourceFile { path: prefix.put_into(path), content: prefix.put_into(&content) });
-        }
+        exported.extend(filled(&TEMPLATES, &hand, prefix)?);
         Ok(Self { files: exported, costs: hand.costs })
     }
 }

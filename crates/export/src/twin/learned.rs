@@ -7,7 +7,6 @@ use ohmstrain_model::StrainRange;
 use ohmstrain_sensor::PortableCorrection;
 use ohmstrain_sensor::correction::OwnedCorrection;
 
-use super::number;
 use crate::quadratic::OwnedQuadratic;
 
 /// A correction, and the quadratic functions that replace rows left out.
@@ -26,10 +25,8 @@ impl<T: Real> OwnedLearned<T> {
         limits: StrainRange<T>,
     ) -> Self {
         let features = correction.features.to();
-        let numbers = |all: &[f64]| all.iter().copied().map(number).collect();
-        let narrow = |of: &OwnedQuadratic| OwnedQuadratic { linear: numbers(&of.linear), square: numbers(&of.square) };
-        let rows = OwnedCorrection { limits, ..correction.learned.map(number) };
-        Self { features, rows, quadratics: quadratics.map(|both| both.each_ref().map(narrow)) }
+        let rows = OwnedCorrection { limits, ..correction.learned.map(T::of) };
+        Self { features, rows, quadratics: quadratics.map(|both| both.each_ref().map(|one| one.map(T::of))) }
     }
 
     /// Borrows it in the form that a live filter takes.

@@ -16,7 +16,6 @@ use ohmstrain_sensor::{EstimatorKind, HISTORIES, HYPOTHESES};
 use super::ExportError;
 use super::fixed_rate::FixedRate;
 pub use learned::OwnedLearned;
-use parts::number;
 pub use parts::{Numbers, Parts, bits, filter_parts};
 
 /// Number of probabilities of the chain.
@@ -141,7 +140,7 @@ pub fn with_twin<T: Real, const B: usize, const N: usize, const L: usize, J: Tas
     task: J,
 ) -> Result<J::Output, ExportError> {
     let parts = &sensor.parts;
-    let kernel = SparseEkf::<T, Compact, B, N>::new(model, number(parts.live.dt_s)).map_err(refused)?;
+    let kernel = SparseEkf::<T, Compact, B, N>::new(model, T::of(parts.live.dt_s)).map_err(refused)?;
     let of = Of { sensor, numbers, task };
     let output = match (parts.kind, parts.phases) {
         (EstimatorKind::SignSplit, Some(phases)) => {

@@ -47,11 +47,6 @@ pub struct Numbers<'a, T> {
     pub length_s: fn(T) -> T,
 }
 
-/// Converts a number of a file to the precision.
-pub fn number<T: Real>(value: f64) -> T {
-    T::of(value)
-}
-
 impl Parts<'_> {
     /// Returns the limits in any precision.
     pub fn limits_in<T: Real>(&self) -> StrainRange<T> {
@@ -67,8 +62,8 @@ pub fn filter_parts<T: Real>(
     phases: &PhaseParams,
     limits: StrainRange<T>,
 ) -> Result<(Dwell<T>, Evidence<T>), StepError> {
-    let dwell = Dwell::new(number(phases.hold_time_s), number(phases.move_time_s), number(phases.reversal));
-    let evidence = Evidence::new(limits, number(phases.tempering));
+    let dwell = Dwell::new(T::of(phases.hold_time_s), T::of(phases.move_time_s), T::of(phases.reversal));
+    let evidence = Evidence::new(limits, T::of(phases.tempering));
     // Checked when the file was read, but single precision may still round a number to zero.
     dwell.and_then(|dwell| Ok((dwell, evidence?))).map_err(|_| StepError::NonFiniteState)
 }

@@ -125,8 +125,7 @@ pub fn reference_lag(samples: &Samples) -> Result<Lag, LagError> {
 }
 
 fn on_one_clock(samples: &Samples) -> Result<Lag, LagError> {
-    let lasts_s = samples.time_s.last().zip(samples.time_s.first()).map_or(0.0, |(last, first)| last - first);
-    if lasts_s >= LONG * FARTHEST_S { lag_by_law(samples) } else { lag_by_motion(samples) }
+    if samples.duration_s() >= LONG * FARTHEST_S { lag_by_law(samples) } else { lag_by_motion(samples) }
 }
 
 fn lag_by_motion(samples: &Samples) -> Result<Lag, LagError> {

@@ -1,7 +1,7 @@
 use nalgebra::{SMatrix, SVector};
 
-use crate::motion_stats::strokes;
-use crate::order::{extent, mean};
+use crate::motion_stats::{moving_mean, strokes};
+use crate::order::extent;
 use crate::samples::usual_step_s;
 
 /// Number of regressors, the constant included.
@@ -18,8 +18,6 @@ const FEWEST: usize = 40;
 pub(super) const BLOCKS: usize = 10;
 /// Ridge of the regression, relative to each regressor's square: a held-out block may contain values that others do not.
 const RIDGE: f64 = 1e-4;
-/// Rows to each side over which a speed is averaged: a reference's noise is larger than its steps.
-const SMOOTHED: usize = 2;
 
 type Regressors = SVector<f64, { PARAMETERS - 1 }>;
 type Row = SVector<f64, PARAMETERS>;
@@ -225,10 +223,9 @@ fn step_s(times: &[f64]) -> Option<f64> {
     Some(usual_step_s([times].into_iter())).filter(|step| *step > 0.0)
 }
 
-/// Returns the mean speed along the path; holds do not count.
+/// Returns the mean speed along the path, smoothed, because a reference's noise is larger than its steps; holds do not count.
 fn typical_rate(grid: &[f64], step_s: f64) -> f64 {
-    let window = |i: usize| &grid[i.saturating_sub(SMOOTHED)..(i + SMOOTHED + 1).min(grid.len())];
-    let smooth: Vec<f64> = (0..grid.len()).map(|i| mean(window(i).iter().copied())).collect();
+    let smooth = moving_mean(grid);
     let ways = smooth.windows(2).map(|pair| (pair[1] - pair[0]).abs());
     let (squares, sum) = ways.fold((0.0, 0.0), |(squares, sum), way| (squares + way * way, sum + way));
     squares / sum / step_s
