@@ -1,6 +1,7 @@
 use csv::StringRecord;
 
 use crate::error::{Fault, quote};
+use crate::row::ReferenceQuantity;
 
 /// Columns with a meaning in a trace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,7 +38,6 @@ impl Column {
     const TIMES: [Self; 2] = [Self::TimeS, Self::TimeUs];
     const READINGS: [Self; 3] = [Self::ResistanceOhm, Self::ResistanceRatio, Self::Adc];
     const REFERENCES: [Self; 3] = [Self::Strain, Self::DisplacementMm, Self::AngleDeg];
-    const TEMPERATURES: [Self; 1] = [Self::TemperatureC];
 
     /// Returns the column of this one's standard deviation.
     pub(crate) const fn deviation(self) -> Option<Self> {
@@ -45,6 +45,14 @@ impl Column {
             Self::Strain => Some(Self::StrainSd),
             Self::AngleDeg => Some(Self::AngleSd),
             _ => None,
+        }
+    }
+
+    /// Returns the column of a reference.
+    pub(crate) const fn of_reference(quantity: ReferenceQuantity) -> Self {
+        match quantity {
+            ReferenceQuantity::Strain => Self::Strain,
+            ReferenceQuantity::AngleDeg => Self::AngleDeg,
         }
     }
 
@@ -91,21 +99,19 @@ pub(crate) struct Columns {
 
 impl Columns {
     pub(crate) fn of_header(header: &StringRecord) -> Result<Self, Fault> {
-        let at_most_one = |group: &[Column]| one_of(header, group);
         let exactly_one = |group: &[Column]| {
             let found = || quote(&header.iter().collect::<Vec<_>>().join(","));
-            one_of(header, group)?.ok_or_else(|| {
-                Fault::new(format!("a header with the column {}", names(group, " or ")), found()).foreign()
-            })
+            one_of(header, group)?
+                .ok_or_else(|| Fault::new(format!("a header with the column {}", names(group)), found()).foreign())
         };
-        let reference = at_most_one(&Column::REFERENCES)?;
+        let reference = one_of(header, &Column::REFERENCES)?;
         let deviation = reference.and_then(|place| place.column.deviation());
         Ok(Self {
             time: exactly_one(&Column::TIMES)?,
             reading: exactly_one(&Column::READINGS)?,
             reference,
-            reference_sd: deviation.map_or(Ok(None), |column| at_most_one(&[column]))?,
-            temperature: at_most_one(&Column::TEMPERATURES)?,
+            reference_sd: deviation.map_or(Ok(None), |column| one_of(header, &[column]))?,
+            temperature: one_of(header, &[Column::TemperatureC])?,
             width: header.len(),
         })
     }
@@ -118,13 +124,13 @@ fn one_of(header: &StringRecord, group: &[Column]) -> Result<Option<ColumnPlace>
         let Some(column) = group.iter().copied().find(|column| column.name() == name.trim()) else { continue };
         if let Some(first) = seen {
             let found = format!("{} and {}", quote(first.column.name()), quote(column.name()));
-            return Err(Fault::in_column(column.name(), format!("one column {}", names(group, " or ")), found));
+            return Err(Fault::in_column(column.name(), format!("one column {}", names(group)), found));
         }
         seen = Some(ColumnPlace { column, index });
     }
     Ok(seen)
 }
 
-fn names(group: &[Column], between: &str) -> String {
-    group.iter().map(|column| format!("`{}`", column.name())).collect::<Vec<_>>().join(between)
+fn names(group: &[Column]) -> String {
+    group.iter().map(|column| format!("`{}`", column.name())).collect::<Vec<_>>().join(" or ")
 }

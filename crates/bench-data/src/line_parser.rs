@@ -109,10 +109,7 @@ impl LineParser {
     /// and the temperature, if there are any; none before the header.
     pub fn recorded_columns(&self) -> impl Iterator<Item = &'static str> + use<> {
         let reading = self.stream.as_ref().map(|stream| stream.columns.reading.column);
-        let reference = self.reference_quantity().map(|quantity| match quantity {
-            ReferenceQuantity::Strain => Column::Strain,
-            ReferenceQuantity::AngleDeg => Column::AngleDeg,
-        });
+        let reference = self.reference_quantity().map(Column::of_reference);
         let temperature = self.has_temperature().then_some(Column::TemperatureC);
         reading.into_iter().chain(reference).chain(temperature).map(Column::name)
     }

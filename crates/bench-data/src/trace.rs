@@ -1,6 +1,7 @@
 use std::io::Read;
 use std::ops::Range;
 
+use crate::columns::Column;
 use crate::error::{Fault, TraceError};
 use crate::metadata::Metadata;
 use crate::reader::TraceReader;
@@ -18,6 +19,25 @@ pub struct Readings {
     pub values: Vec<f64>,
     /// Further data of readings that came from a converter.
     pub converter: Option<ConverterReadings>,
+}
+
+impl Readings {
+    /// Returns the column in which they are written.
+    pub(crate) const fn column(&self) -> Column {
+        match (&self.converter, self.kind) {
+            (Some(_), _) => Column::Adc,
+            (None, ReadingKind::Ohm) => Column::ResistanceOhm,
+            (None, ReadingKind::Ratio) => Column::ResistanceRatio,
+        }
+    }
+
+    /// Returns a reading as written: the code of a converter, or the value.
+    pub(crate) fn written(&self, row: usize) -> f64 {
+        match &self.converter {
+            Some(converter) => converter.codes[row].map_or(f64::NAN, f64::from),
+            None => self.values[row],
+        }
+    }
 }
 
 /// Data of a converter's readings beyond the resistance, one entry per row.
@@ -140,28 +160,34 @@ impl Trace {
     /// Returns some of the rows; rows beyond the last one are ignored.
     #[must_use]
     pub fn rows(&self, range: Range<usize>) -> Self {
-        fn cut<T: Clone>(values: &[T], range: &Range<usize>) -> Vec<T> {
-            let end = range.end.min(values.len());
-            values[range.start.min(end)..end].to_vec()
+        self.picked(range.start..range.end.min(self.len()))
+    }
+
+    /// Returns rows in this order.
+    pub(crate) fn picked(&self, rows: impl ExactSizeIterator<Item = usize> + Clone) -> Self {
+        // Deviations of an exact reference are empty.
+        fn some<T: Clone>(values: &[T], rows: impl ExactSizeIterator<Item = usize>) -> Vec<T> {
+            if values.is_empty() { Vec::new() } else { rows.map(|row| values[row].clone()).collect() }
         }
+        let numbers = |values: &Vec<f64>| some(values, rows.clone());
         Self {
             metadata: self.metadata.clone(),
-            time_s: cut(&self.time_s, &range),
+            time_s: numbers(&self.time_s),
             readings: Readings {
                 kind: self.readings.kind,
-                values: cut(&self.readings.values, &range),
+                values: numbers(&self.readings.values),
                 converter: self.readings.converter.as_ref().map(|converter| ConverterReadings {
-                    codes: cut(&converter.codes, &range),
-                    sd_ohm: cut(&converter.sd_ohm, &range),
-                    saturated: cut(&converter.saturated, &range),
+                    codes: some(&converter.codes, rows.clone()),
+                    sd_ohm: numbers(&converter.sd_ohm),
+                    saturated: some(&converter.saturated, rows.clone()),
                 }),
             },
             reference: self.reference.as_ref().map(|reference| Reference {
                 quantity: reference.quantity,
-                values: cut(&reference.values, &range),
-                sd: cut(&reference.sd, &range),
+                values: numbers(&reference.values),
+                sd: numbers(&reference.sd),
             }),
-            temperature_c: self.temperature_c.as_ref().map(|values| cut(values, &range)),
+            temperature_c: self.temperature_c.as_ref().map(numbers),
         }
     }
 }

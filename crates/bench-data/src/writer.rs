@@ -1,7 +1,6 @@
 use std::io::{self, Write};
 
 use crate::columns::Column;
-use crate::row::{ReadingKind, ReferenceQuantity};
 use crate::rows::RowWriter;
 use crate::trace::Trace;
 
@@ -38,30 +37,19 @@ impl Trace {
     }
 
     fn header(&self) -> Vec<Column> {
-        let reading = match (&self.readings.converter, self.readings.kind) {
-            (Some(_), _) => Column::Adc,
-            (None, ReadingKind::Ohm) => Column::ResistanceOhm,
-            (None, ReadingKind::Ratio) => Column::ResistanceRatio,
-        };
-        let reference = self.reference.as_ref().map(|reference| match reference.quantity {
-            ReferenceQuantity::Strain => Column::Strain,
-            ReferenceQuantity::AngleDeg => Column::AngleDeg,
-        });
+        let reference = self.reference.as_ref().map(|reference| Column::of_reference(reference.quantity));
         let has_sd = self.reference.as_ref().is_some_and(|reference| !reference.sd.is_empty());
         let deviation = reference.filter(|_| has_sd).and_then(Column::deviation);
         let temperature = self.temperature_c.as_ref().map(|_| Column::TemperatureC);
-        [Some(Column::TimeS), Some(reading), reference, deviation, temperature].into_iter().flatten().collect()
+        [Some(Column::TimeS), Some(self.readings.column()), reference, deviation, temperature]
+            .into_iter()
+            .flatten()
+            .collect()
     }
 
     fn write_row(&self, row: usize, rows: &mut RowWriter<impl Write>) -> io::Result<()> {
         rows.number(self.time_s[row]);
-        number(
-            rows,
-            match &self.readings.converter {
-                Some(converter) => converter.codes[row].map_or(f64::NAN, f64::from),
-                None => self.readings.values[row],
-            },
-        );
+        number(rows, self.readings.written(row));
         let reference = self.reference.iter().flat_map(|reference| [&reference.values, &reference.sd]);
         for values in reference.filter(|values| !values.is_empty()).chain(&self.temperature_c) {
             number(rows, values[row]);

@@ -20,7 +20,7 @@ mod simulate;
 mod split;
 mod trace;
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand, ValueEnum};
 
 pub use batch::{BatchArgs, BatchCommand, SummaryForm};
 pub use calibrate::{CalibrateArgs, ReportArgs};
@@ -30,7 +30,7 @@ pub use evaluate::{Estimators, EvaluateArgs};
 pub use export::ExportArgs;
 pub use files::{ImportArgs, InspectArgs};
 pub use fit_law::{FitLawArgs, SegmentChoice, TableFormat, phase_name};
-pub use fleet::{FleetArgs, FleetCommand, FleetFitArgs};
+pub use fleet::{FleetArgs, FleetCommand};
 pub use hand::HandArgs;
 pub use live::LiveArgs;
 pub use plan::PlanArgs;
@@ -80,8 +80,12 @@ impl Args {
 
 /// The example that a command's help leads with.
 pub fn example(command: &str) -> Option<String> {
-    let known = Args::command().find_subcommand(command)?.get_before_help()?.to_string();
-    Some(known)
+    Some(Args::command().find_subcommand(command)?.get_before_help()?.to_string())
+}
+
+/// The name of a choice on the command line.
+pub fn name_of(choice: impl ValueEnum) -> String {
+    choice.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
 }
 
 /// The commands.

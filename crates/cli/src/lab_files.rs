@@ -4,13 +4,10 @@ use std::path::{Path, PathBuf};
 use ohmstrain_bench_data::import::{ImportError, Plan, Recipe, Table, read_table};
 
 use crate::error::{CliError, shell_word};
-use crate::output::{Kind, is_of_a_hand};
+use crate::output::{HEAD, Kind, is_of_a_hand};
 use crate::sensor_file;
 use crate::whole_file;
 use crate::whole_file::is_stdin;
-
-/// Number of first bytes by which the kind of a file is recognised.
-const HEAD: u64 = 4096;
 
 /// Refuses results of this program, which look like tables, too.
 pub fn refuse_results(path: &Path) -> Result<(), CliError> {

@@ -6,12 +6,11 @@ use std::sync::{Mutex, PoisonError};
 use crate::printable::printable;
 
 /// Verbosity of messages other than errors.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verbosity {
     /// Nothing.
     Quiet,
     /// Remarks, warnings and progress.
-    #[default]
     Usual,
     /// Steps of the work with their times, in addition.
     Detailed,

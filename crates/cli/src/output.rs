@@ -16,8 +16,8 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 pub use kind::{IMPORT, Kind, MANUAL, SIMULATE, is_of_a_hand, is_this_program};
-pub use place::Destination;
 use place::Identity;
+pub use place::{Destination, HEAD};
 pub use rows::RowsOut;
 use unfinished::Unfinished;
 pub use unfinished::UnfinishedFolder;

@@ -4,7 +4,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 
 use super::Fault;
-use super::readings::{normal, uniform};
+use super::readings::uniform;
+use crate::simulate::normal;
 use crate::trace::Trace;
 
 /// Largest displacement of a row's time, as a fraction of the step to its neighbour.
@@ -29,7 +30,7 @@ pub(super) fn put_into(trace: &mut Trace, rows: Range<usize>, fault: Fault, seed
             let order: Vec<usize> = (0..trace.len())
                 .flat_map(|row| std::iter::repeat_n(row, if twice(row, &mut random) { 2 } else { 1 }))
                 .collect();
-            arrange(trace, &order);
+            *trace = trace.picked(order.into_iter());
         }
         Fault::Late { share } => {
             let mut order: Vec<usize> = (0..trace.len()).collect();
@@ -41,7 +42,7 @@ pub(super) fn put_into(trace: &mut Trace, rows: Range<usize>, fault: Fault, seed
                 }
                 row += 1;
             }
-            arrange(trace, &order);
+            *trace = trace.picked(order.into_iter());
         }
         _ => {}
     }
@@ -55,25 +56,5 @@ fn jitter(time_s: &mut [f64], rows: Range<usize>, share: f64, random: &mut ChaCh
         let (Some(after), Some(before)) = (after.or(before), before.or(after)) else { return };
         let off = share * normal(random) * after.min(before);
         time_s[row] = exact[row] + off.clamp(-NEAREST * before, NEAREST * after);
-    }
-}
-
-/// Arranges the rows of the recording in this order.
-fn arrange(trace: &mut Trace, order: &[usize]) {
-    fn arranged<T: Clone>(values: &mut Vec<T>, order: &[usize]) {
-        *values = order.iter().map(|&row| values[row].clone()).collect();
-    }
-    arranged(&mut trace.time_s, order);
-    arranged(&mut trace.readings.values, order);
-    if let Some(converter) = &mut trace.readings.converter {
-        arranged(&mut converter.codes, order);
-        arranged(&mut converter.sd_ohm, order);
-        arranged(&mut converter.saturated, order);
-    }
-    if let Some(reference) = &mut trace.reference {
-        arranged(&mut reference.values, order);
-    }
-    if let Some(temperature) = &mut trace.temperature_c {
-        arranged(temperature, order);
     }
 }

@@ -2,10 +2,11 @@ use std::ops::Range;
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
-use rand_distr::{Distribution, StandardNormal, StandardUniform};
+use rand_distr::{Distribution, StandardUniform};
 
 use super::Fault;
 use crate::order::extent;
+use crate::simulate::normal;
 
 /// Changes the readings of some rows; missing ones stay missing.
 pub(super) fn put_into(values: &mut [f64], rows: Range<usize>, fault: Fault, seed: u64) {
@@ -38,8 +39,4 @@ pub(super) fn put_into(values: &mut [f64], rows: Range<usize>, fault: Fault, see
 /// Draws a uniform number in [0, 1).
 pub(super) fn uniform(random: &mut ChaCha8Rng) -> f64 {
     StandardUniform.sample(random)
-}
-
-pub(super) fn normal(random: &mut ChaCha8Rng) -> f64 {
-    StandardNormal.sample(random)
 }

@@ -32,6 +32,7 @@ pub use bench::simulate;
 pub use chamber::Chamber;
 pub use material::{Material, UnknownMaterial};
 pub use noise::Disturbances;
+pub(crate) use noise::normal;
 pub use person::{Followed, Person};
 pub use protocol::{Protocol, UnknownProtocol};
 pub use settings::{SettingsError, SimulationSettings};

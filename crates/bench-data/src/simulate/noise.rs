@@ -84,7 +84,7 @@ pub(super) fn random(seed: u64, stream: Stream) -> ChaCha8Rng {
     random
 }
 
-pub(super) fn normal(random: &mut ChaCha8Rng) -> f64 {
+pub(crate) fn normal(random: &mut ChaCha8Rng) -> f64 {
     StandardNormal.sample(random)
 }
 

@@ -96,19 +96,12 @@ impl Profile {
 
     fn ramp(&mut self, to: f64, rate: f64) {
         let (time_s, strain) = self.last();
-        let duration_s = (to - strain).abs() / rate;
-        if duration_s > 0.0 {
-            self.time_s.push(time_s + duration_s);
-            self.strain.push(to);
-        }
+        self.line_to(time_s + (to - strain).abs() / rate, to);
     }
 
     fn hold(&mut self, duration_s: f64) {
         let (time_s, strain) = self.last();
-        if duration_s > 0.0 {
-            self.time_s.push(time_s + duration_s);
-            self.strain.push(strain);
-        }
+        self.line_to(time_s + duration_s, strain);
     }
 
     /// Appends blocks in a fixed order, so that each half of the recording has some of every kind, with random sizes and speeds.
@@ -141,8 +134,7 @@ impl Profile {
         let (t0, t1, e0, e1) = (self.time_s[keep - 1], self.time_s[keep], self.strain[keep - 1], self.strain[keep]);
         self.time_s.truncate(keep);
         self.strain.truncate(keep);
-        self.time_s.push(end_s);
-        self.strain.push(e0 + (e1 - e0) * (end_s - t0) / (t1 - t0));
+        self.line_to(end_s, e0 + (e1 - e0) * (end_s - t0) / (t1 - t0));
     }
 }
 

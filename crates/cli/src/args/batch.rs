@@ -62,20 +62,7 @@ pub enum BatchCommand {
     Calibrate,
 }
 
-impl BatchCommand {
-    /// Its name.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Filter => "filter",
-            Self::Smooth => "smooth",
-            Self::Hand => "hand",
-            Self::Evaluate => "evaluate",
-            Self::Calibrate => "calibrate",
-        }
-    }
-}
-
-/// Form of a summary.
+/// Form of a summary; its name is what the file's name ends in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum SummaryForm {
     /// A line per recording
@@ -84,17 +71,6 @@ pub enum SummaryForm {
     Json,
     /// Apache Parquet
     Parquet,
-}
-
-impl SummaryForm {
-    /// Returns the extension of file names.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Csv => "csv",
-            Self::Json => "json",
-            Self::Parquet => "parquet",
-        }
-    }
 }
 
 /// Text of the long help after the flags.

@@ -4,7 +4,7 @@ use std::str::FromStr;
 use clap::{Args as ClapArgs, ValueEnum};
 use ohmstrain::{EstimatorKind, Influence, Known, influence};
 
-use super::{Auto, ReplaceArgs, SetupArgs, UnitArgs, finite, positive};
+use super::{Auto, ReplaceArgs, SetupArgs, UnitArgs, finite, name_of, positive};
 
 /// Flags that `filter`, `smooth` and `live` share.
 #[derive(Debug, ClapArgs)]
@@ -67,23 +67,13 @@ pub enum Without {
     Doubts,
 }
 
-/// Form of a table of rows.
+/// Form of a table of rows; its name is what file names end in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Format {
     /// Text, a line per row
     Csv,
     /// Apache Parquet: the same numbers in a quarter of the space, complete with the last row only
     Parquet,
-}
-
-impl Format {
-    /// Its name, which is what file names end in.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Csv => "csv",
-            Self::Parquet => "parquet",
-        }
-    }
 }
 
 /// Form and file of the estimates.
@@ -107,7 +97,8 @@ impl WrittenArgs {
     /// The form that flag or name ask for.
     pub fn format(&self) -> Format {
         let named = self.output.as_deref().and_then(|path| path.extension());
-        if named.is_some_and(|ending| ending == Format::Parquet.name()) { Format::Parquet } else { self.format }
+        let is_parquet = named.is_some_and(|ending| ending == name_of(Format::Parquet).as_str());
+        if is_parquet { Format::Parquet } else { self.format }
     }
 }
 

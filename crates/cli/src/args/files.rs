@@ -1,3 +1,4 @@
+use std::error::Error;
 use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
@@ -135,15 +136,14 @@ impl FilesArgs {
     }
 }
 
-fn pair(text: &str) -> Result<(ColumnName, ColumnName), String> {
+fn pair(text: &str) -> Result<(ColumnName, ColumnName), Box<dyn Error + Send + Sync>> {
     let (reading, reference) = text.split_once('=').ok_or("expected COLUMN=COLUMN, the readings before the =")?;
-    let named = |text: &str| text.parse().map_err(|error: ohmstrain_bench_data::import::RecipeError| error.to_string());
-    Ok((named(reading)?, named(reference)?))
+    Ok((reading.parse()?, reference.parse()?))
 }
 
-fn column(text: &str) -> Result<(Role, ColumnName), String> {
+fn column(text: &str) -> Result<(Role, ColumnName), Box<dyn Error + Send + Sync>> {
     let (role, column) = text.split_once('=').ok_or("expected ROLE=COLUMN")?;
-    Ok((role.parse()?, column.parse().map_err(|error: ohmstrain_bench_data::import::RecipeError| error.to_string())?))
+    Ok((role.parse()?, column.parse()?))
 }
 
 fn unit(text: &str) -> Result<(Role, String), String> {

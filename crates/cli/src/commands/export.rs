@@ -33,7 +33,7 @@ pub fn run(args: &ExportArgs) -> Result<(), CliError> {
     let compared = recording.as_ref().map(|recording| recording.compared(params, &plan, args)).transpose()?;
     let promise = Promise::new(params, &plan, dt_s, compared.as_ref(), args.budget.as_ref()).map_err(refused)?;
     let worse = |compared: &&Compared| compared.exported.rmse > compared.static_cubic.rmse;
-    let worse_on = compared.as_ref().filter(worse).and(recording.as_ref()).map(OnRecording::name);
+    let worse_on = compared.as_ref().filter(worse).and(recording.as_ref()).map(|recording| recording.name.as_str());
     let files =
         export::files(params, &plan, args.target.into(), dt_s, &args.prefix, &promise.lines).map_err(refused)?;
     let mut outputs = Outputs::new(args.force, std::iter::once(&args.sensor).chain(&args.score));

@@ -6,7 +6,7 @@ use crate::args::ExportArgs;
 use crate::commands::export_score::OnRecording;
 use crate::error::CliError;
 use crate::output;
-use ohmstrain_export::{self as export, Budget, Candidate, Plan};
+use ohmstrain_export::{self as export, Candidate, Plan};
 
 /// Filter that is exported, and the candidates.
 pub struct Choice {
@@ -31,32 +31,16 @@ pub fn choose(
     dt_s: f64,
     recording: Option<&OnRecording>,
 ) -> Result<Choice, CliError> {
-    let asked = args.estimator.chosen();
-    match &args.budget {
-        Some(budget) => within(args, params, dt_s, budget, recording),
-        None => Ok(Choice { plan: Plan { kind: asked, ..Plan::default() }, lines: Vec::new() }),
-    }
-}
-
-/// A candidate with its error in percent of full scale, or its rank in the table.
-struct Ranked {
-    candidate: Candidate,
-    rank: f64,
-}
-
-fn within(
-    args: &ExportArgs,
-    params: &SensorParams,
-    dt_s: f64,
-    budget: &Budget,
-    recording: Option<&OnRecording>,
-) -> Result<Choice, CliError> {
+    let Some(budget) = &args.budget else {
+        let plan = Plan { kind: args.estimator.chosen(), ..Plan::default() };
+        return Ok(Choice { plan, lines: Vec::new() });
+    };
     let name = args.sensor.display().to_string();
     let candidates =
         export::candidates(params, budget, dt_s).map_err(|error| CliError::export(&error, &name))?.into_iter();
     let ranked = candidates.enumerate().map(|(place, candidate)| {
         let rank = match recording {
-            Some(recording) => recording.error(params, &candidate.plan, args)?,
+            Some(recording) => recording.exported(params, &candidate.plan, args)?.rmse_percent_fs,
             None => place as f64,
         };
         Ok(Ranked { candidate, rank })
@@ -73,6 +57,12 @@ fn within(
     }
     lines.push(String::new());
     Ok(Choice { plan: best.candidate.plan, lines })
+}
+
+/// A candidate with its error in percent of full scale, or its rank in the table.
+struct Ranked {
+    candidate: Candidate,
+    rank: f64,
 }
 
 /// Returns a table of all candidates, the best first.

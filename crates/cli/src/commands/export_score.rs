@@ -12,7 +12,8 @@ use ohmstrain_export::{self as export, Compared, ExportTarget, Plan, Promise, Re
 
 /// A recording with a reference, and the live estimates of this computer and of a static cubic for it.
 pub struct OnRecording {
-    name: String,
+    /// Name of its file.
+    pub name: String,
     from_s: Option<f64>,
     dt_s: f64,
     rows: Vec<ReplayedRow>,
@@ -56,7 +57,7 @@ impl OnRecording {
     }
 
     /// Returns the scores of the exported code.
-    fn exported(&self, params: &SensorParams, plan: &Plan, args: &ExportArgs) -> Result<Scores, CliError> {
+    pub fn exported(&self, params: &SensorParams, plan: &Plan, args: &ExportArgs) -> Result<Scores, CliError> {
         let replayed = export::replay(params, plan, self.dt_s, &self.rows)
             .map_err(|error| CliError::export(&error, &args.sensor.display().to_string()))?;
         let of = |(row, estimate): (&ScoredRow, &export::ChipEstimate)| ScoredRow {
@@ -74,16 +75,6 @@ impl OnRecording {
             computer: self.scores(&self.program)?,
             static_cubic: self.scores(&self.static_cubic)?,
         })
-    }
-
-    /// Returns the name of its file.
-    pub fn name(&self) -> &str {
-        &self.name
-    }
-
-    /// Returns its error, percent of full scale.
-    pub fn error(&self, params: &SensorParams, plan: &Plan, args: &ExportArgs) -> Result<f64, CliError> {
-        Ok(self.exported(params, plan, args)?.rmse_percent_fs)
     }
 }
 

@@ -28,7 +28,7 @@ pub fn run(args: &FilterArgs, messages: &Messages) -> Result<u64, CliError> {
     let WrittenArgs { output, replace, columns, .. } = &args.written;
     let inputs = [&args.trace_file, &args.estimate.sensor];
     let mut rows_out = RowsOut::claim(output.as_deref(), columns, replace.force, inputs)?;
-    let claim = args.save_state.as_deref().map(|path| rows_out.claim_beside(path, Kind::State)).transpose()?;
+    let claim = args.save_state.as_deref().map(|path| rows_out.outputs.claim(path, Kind::State)).transpose()?;
     let mut sensor = sensor_file::read(&args.estimate.sensor, kind)?;
     let stored = args.resume.as_deref().map(filter_state::read).transpose()?;
     // Wrong flags are refused before a stream is waited for.
@@ -58,8 +58,8 @@ pub fn run(args: &FilterArgs, messages: &Messages) -> Result<u64, CliError> {
     let skipped = Skipped::default();
     let stream = Stream { args, filter, sink, stored, times: None, restarted: false, skipped };
     let (written, state) = stream.run(rows)?;
-    claim.into_iter().zip(state).for_each(|(claim, state)| rows_out.put(claim, state));
-    rows_out.publish()?;
+    claim.into_iter().zip(state).for_each(|(claim, state)| rows_out.outputs.put(claim, state));
+    rows_out.outputs.publish()?;
     Ok(written)
 }
 

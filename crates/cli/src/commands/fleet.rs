@@ -3,7 +3,7 @@ use std::path::Path;
 use ohmstrain::{Prior, Sensor};
 use ohmstrain_bench_data::counted;
 
-use crate::args::{FleetArgs, FleetCommand, FleetFitArgs};
+use crate::args::{FleetArgs, FleetCommand};
 use crate::error::CliError;
 use crate::messages::Messages;
 use crate::output::{Kind, Outputs, print};
@@ -12,12 +12,7 @@ use crate::whole_file;
 
 /// Learns a prior from sensors of one make.
 pub fn run(args: &FleetArgs, messages: &Messages) -> Result<(), CliError> {
-    match &args.command {
-        FleetCommand::Fit(args) => fit(args, messages),
-    }
-}
-
-fn fit(args: &FleetFitArgs, messages: &Messages) -> Result<(), CliError> {
+    let FleetCommand::Fit(args) = &args.command;
     let mut outputs = Outputs::new(args.replace.force, &args.sensors);
     let output = outputs.claim(&args.output, Kind::Prior)?;
     let sensors = args.sensors.iter().map(|path| sensor_file::read(path, None));

@@ -15,28 +15,26 @@ use ohmstrain::MADE_BY;
 pub fn run(args: &ImportArgs, messages: &Messages) -> Result<(), CliError> {
     let mut outputs = Outputs::new(args.replace.force, &args.files);
     let recipe = args.known.recipe();
-    if let Some(path) = args.output.as_deref().filter(|_| args.split_recordings) {
-        let tables = lab_files::read(&args.files, &recipe)?;
-        if args.each {
-            let plan = EachPlan::new(&tables, &recipe, &args.pairs)?;
-            name_channels(&plan, &tables, messages);
-            return split(outputs, path, &plan.recordings(&tables)?, messages, |part| each(&plan, part, messages));
-        }
-        let plan = Plan::new(&tables, &recipe)?;
-        messages.remark(&columns(&plan, &tables));
-        return split(outputs, path, &plan.recordings(&tables)?, messages, |part| trace(&plan, part, messages));
-    }
-    let output = outputs.claim_or_stdout(args.output.as_deref(), Kind::Import)?;
+    let parts = args.output.as_deref().filter(|_| args.split_recordings);
+    let whole = args.output.as_deref().filter(|_| !args.split_recordings);
+    let output = outputs.claim_or_stdout(whole, Kind::Import)?;
     let tables = lab_files::read(&args.files, &recipe)?;
     if args.each {
         let plan = EachPlan::new(&tables, &recipe, &args.pairs)?;
         name_channels(&plan, &tables, messages);
-        return outputs.publish_or_print(output, each(&plan, &tables, messages)?);
+        return match parts {
+            Some(path) => {
+                split(outputs, path, &plan.recordings(&tables)?, messages, |part| each(&plan, part, messages))
+            }
+            None => outputs.publish_or_print(output, each(&plan, &tables, messages)?),
+        };
     }
     let plan = Plan::new(&tables, &recipe)?;
     messages.remark(&columns(&plan, &tables));
-    let bytes = trace(&plan, &tables, messages)?;
-    outputs.publish_or_print(output, bytes)
+    match parts {
+        Some(path) => split(outputs, path, &plan.recordings(&tables)?, messages, |part| trace(&plan, part, messages)),
+        None => outputs.publish_or_print(output, trace(&plan, &tables, messages)?),
+    }
 }
 
 /// Writes each recording to a file of its own, all or none, and prints their names.

@@ -60,7 +60,7 @@ pub fn run(args: &SmoothArgs, messages: &Messages) -> Result<u64, CliError> {
     segments.write_in_order(&mut writer, see)?;
     readings.whole()?;
     let written = writer.finish()?;
-    rows_out.publish()?;
+    rows_out.outputs.publish()?;
     Ok(written)
 }
 

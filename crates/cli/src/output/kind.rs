@@ -62,32 +62,29 @@ impl Kind {
     /// True if a text with this beginning is of this kind and was written by this program. `own` are the columns of the table
     /// that will replace it.
     pub fn wrote(self, head: &str, own: &[String]) -> bool {
-        let mut lines = head.lines();
-        let mut line = || lines.next().unwrap_or_default();
+        let first = head.lines().next().unwrap_or_default();
+        let third_is = |start: &str| third_of_toml(head).is_some_and(|third| third.starts_with(start));
         match self {
             // Only recordings that can be made again are marked: simulations, and imports of files that still exist. Recordings
             // by `live` are not.
             Self::Simulation => is_made_by(head, SIMULATE),
             Self::Import => is_made_by(head, IMPORT) || is_made_by(head, SIMULATE),
             Self::Sensor => {
-                let (is_own, third) = (is_format(line()) && is_made_by_toml(line()), line());
-                let others = ["sensors = ", "sensor = "].into_iter().chain(FUSION);
-                is_own && !is_hand(head) && !others.into_iter().any(|other| third.starts_with(other))
+                let mut others = ["sensors = ", "sensor = "].into_iter().chain(FUSION);
+                third_is("") && !is_hand(head) && !others.any(third_is)
             }
             Self::Hand => is_hand(head),
-            Self::Fusion => {
-                let is_own = is_format(line()) && is_made_by_toml(line());
-                let third = line();
-                is_own && FUSION.iter().any(|start| third.starts_with(start))
+            Self::Fusion => FUSION.into_iter().any(third_is),
+            Self::Protocol => third_is("") && head.contains("\n[[positions]]\n"),
+            Self::Prior => third_is("sensors = "),
+            Self::State => third_is("sensor = "),
+            Self::Estimates | Self::Summary => {
+                self.has_columns(&first.split(',').map(str::to_owned).collect::<Vec<_>>(), own)
             }
-            Self::Protocol => is_format(line()) && is_made_by_toml(line()) && head.contains("\n[[positions]]\n"),
-            Self::Prior => is_format(line()) && is_made_by_toml(line()) && line().starts_with("sensors = "),
-            Self::State => is_format(line()) && is_made_by_toml(line()) && line().starts_with("sensor = "),
-            Self::Estimates | Self::Summary => self.has_columns(&names_in(line()), own),
             Self::Report => behind_mark(head, page_start()).is_some_and(|rest| rest.starts_with("\">")),
             Self::Figure => is_figure(head),
             Self::Source => SOURCES.iter().any(|source| source.is_start_of(head)),
-            Self::Manual => behind_mark(line(), MANUAL) == Some(""),
+            Self::Manual => behind_mark(first, MANUAL) == Some(""),
         }
     }
 
@@ -103,6 +100,13 @@ impl Kind {
     }
 }
 
+/// Returns the third line of a TOML file whose first two are a format and this program's name.
+fn third_of_toml(head: &str) -> Option<&str> {
+    let mut lines = head.lines();
+    let is_own = is_format(lines.next()?) && is_made_by_toml(lines.next()?);
+    is_own.then(|| lines.next().unwrap_or_default())
+}
+
 /// True if this is the description of a hand that this program wrote.
 fn is_hand(head: &str) -> bool {
     let lines: Vec<&str> = head.lines().take(4).collect();
@@ -111,10 +115,6 @@ fn is_hand(head: &str) -> bool {
 
 /// Third line of a fusion, of format 2 and of format 1.
 const FUSION: [&str; 2] = ["novelty = ", "sd_scale = "];
-
-fn names_in(header: &str) -> Vec<String> {
-    header.split(',').map(str::to_owned).collect()
-}
 
 /// True if recordings may have a column of this name, too.
 fn is_recorded(name: &str) -> bool {

@@ -53,7 +53,7 @@ pub enum Destination {
 const MOST_LINKS: usize = 40;
 
 /// Number of first bytes by which the kind of a file is recognised.
-const HEAD: u64 = 4096;
+pub const HEAD: u64 = 4096;
 
 impl Destination {
     /// Checks that `path` can be written, and leaves the file as it is.

@@ -12,7 +12,8 @@ const WRITTEN_AT_ONCE: usize = 1 << 16;
 
 /// Destination of estimates.
 pub struct RowsOut {
-    outputs: Outputs,
+    /// The files that are published with the table.
+    pub outputs: Outputs,
     claim: Option<Claim>,
 }
 
@@ -33,7 +34,7 @@ impl RowsOut {
         Ok(Self { outputs, claim })
     }
 
-    /// Opens the writer. A file is published in [`RowsOut::publish`], unless it `grows`: then each row of a live stream is
+    /// Opens the writer. A file is published in [`Outputs::publish`], unless it `grows`: then each row of a live stream is
     /// visible at once, and stays if the stream breaks.
     ///
     /// # Errors
@@ -46,27 +47,6 @@ impl RowsOut {
                 Box::new(BufWriter::with_capacity(WRITTEN_AT_ONCE, Named { file, path }))
             }
         })
-    }
-
-    /// Claims a file that is published with the table.
-    ///
-    /// # Errors
-    /// As [`Outputs::claim`].
-    pub fn claim_beside(&mut self, path: &Path, kind: Kind) -> Result<Claim, CliError> {
-        self.outputs.claim(path, kind)
-    }
-
-    /// Keeps that file's content until all is published.
-    pub fn put(&mut self, claim: Claim, content: String) {
-        self.outputs.put(claim, content);
-    }
-
-    /// Publishes the files.
-    ///
-    /// # Errors
-    /// If a file cannot be published.
-    pub fn publish(self) -> Result<(), CliError> {
-        self.outputs.publish()
     }
 }
 

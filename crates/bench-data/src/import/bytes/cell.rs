@@ -117,10 +117,7 @@ impl Cells {
     pub(crate) fn some(&self, rows: impl Iterator<Item = usize>) -> Self {
         let mut out = Self::default();
         for row in rows {
-            match self.numbers.get(row).copied().filter(|number| number.is_finite()) {
-                Some(number) => out.push_cell(&Cell::Number(number)),
-                None => out.push_cell(&Cell::Text(self.get(row).into())),
-            };
+            out.push_cell(&self.cell(row));
         }
         out
     }
@@ -132,7 +129,11 @@ impl Cells {
 
     /// Returns all cells; those that are numbers in their container are numbers.
     pub(crate) fn cells(&self) -> impl Iterator<Item = Cell<'_>> {
-        let number = |row: usize| self.numbers.get(row).copied().filter(|number| number.is_finite());
-        (0..self.len()).map(move |row| number(row).map_or_else(|| Cell::Text(self.get(row).into()), Cell::Number))
+        (0..self.len()).map(|row| self.cell(row))
+    }
+
+    fn cell(&self, row: usize) -> Cell<'_> {
+        let number = self.numbers.get(row).copied().filter(|number| number.is_finite());
+        number.map_or_else(|| Cell::Text(self.get(row).into()), Cell::Number)
     }
 }

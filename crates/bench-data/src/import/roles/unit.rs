@@ -49,7 +49,7 @@ impl Asked<'_> {
                     quoted(&format!("{}={text}", self.role)),
                     self.role
                 );
-                self.question(what, &units::names(self.role))
+                self.question(what, &self.role.units())
             });
         }
         if self.role.quantity() == Role::Time
@@ -70,7 +70,7 @@ impl Asked<'_> {
                 }
                 let convert = if units::scale_of_a_reference(self.role).is_some() { "" } else { ": convert it first" };
                 let what = format!("{}: the unit `{text}` is none of {}{convert}", self.name, self.role);
-                self.question(what, &units::names(self.role))
+                self.question(what, &self.role.units())
             });
         }
         self.by_numbers(remarks)
@@ -85,7 +85,11 @@ impl Asked<'_> {
     fn refuse_large_ratio(&self, unit: &str) -> Result<(), ImportError> {
         const LARGE: f64 = 50.0;
         let is_percent = units::unit(self.role, unit).is_some_and(|unit| unit.name == "change-percent");
-        if self.role != Role::Ratio || !is_percent || self.is_change() || (self.facts)().numbers.median < LARGE {
+        if self.role != Role::Ratio
+            || !is_percent
+            || is_change(&self.column.name)
+            || (self.facts)().numbers.median < LARGE
+        {
             return Ok(());
         }
         let what = format!("{}: percent of the resistance at rest, or of its change", self.name);
@@ -152,12 +156,12 @@ impl Asked<'_> {
                 Some(cell) => (Some("ohm"), format!("cells such as {cell} have")),
                 None => ((numbers.size >= LEAST_OHM).then_some("ohm"), format!("about {:.0}", numbers.size)),
             },
-            Role::Strain if self.is_stretch_ratio() => {
+            Role::Strain if is_stretch_ratio(self.column, (self.facts)()) => {
                 (Some("1"), format!("about {:.3}, a stretch ratio", numbers.median))
             }
             Role::Strain => ((numbers.largest <= 1.0).then_some("1"), format!("up to {:.3}", numbers.largest)),
             Role::Ratio => {
-                let is_ratio = (0.5..20.0).contains(&numbers.median) && !self.is_change();
+                let is_ratio = (0.5..20.0).contains(&numbers.median) && !is_change(&self.column.name);
                 (is_ratio.then_some("1"), format!("about {:.3}", numbers.median))
             }
             Role::Adc => return known("1").ok_or_else(|| self.question(self.name.clone(), &["1"])),
@@ -173,18 +177,9 @@ impl Asked<'_> {
 
     /// Returns the units that numbers of this role may have.
     fn numeric_units(&self) -> Vec<&'static str> {
-        let mut names = units::names(self.role);
+        let mut names = self.role.units();
         names.retain(|name| units::unit(self.role, name).is_some_and(|unit| unit.scale != Scale::Stamp));
         names
-    }
-
-    /// True for `dR/R0`, a change; false for `R/R0`, a ratio.
-    fn is_change(&self) -> bool {
-        is_change(&self.column.name)
-    }
-
-    fn is_stretch_ratio(&self) -> bool {
-        is_stretch_ratio(self.column, (self.facts)())
     }
 }
 

@@ -1,3 +1,5 @@
+use std::collections::HashMap;
+
 use crate::import::bytes::Cell;
 use crate::import::table::grid::{Grid, SAMPLE};
 use crate::import::table::value::{is_number, value_of};
@@ -56,13 +58,8 @@ impl Data {
         let shapes: Vec<Shape> =
             rows().map(|cells| Shape::of(&cells, decimal)).filter(|shape| shape.numbers > 0).collect();
         let commonest = |among: &dyn Fn(&Shape) -> Option<(usize, usize)>| {
-            let mut counts: Vec<((usize, usize), usize)> = Vec::new();
-            for of in shapes.iter().filter_map(among) {
-                match counts.iter_mut().find(|(known, _)| *known == of) {
-                    Some((_, count)) => *count += 1,
-                    None => counts.push((of, 1)),
-                }
-            }
+            let mut counts = HashMap::<(usize, usize), usize>::new();
+            shapes.iter().filter_map(among).for_each(|of| *counts.entry(of).or_default() += 1);
             counts.into_iter().max_by_key(|(of, count)| (*count, *of)).map(|(of, _)| of)
         };
         let width = commonest(&|shape| Some((shape.width, 0))).map_or(1, |(width, _)| width);

@@ -4,7 +4,7 @@ use crate::import::error::ImportError;
 use crate::import::table::data::{Data, Shape};
 use crate::import::table::grid::{Grid, MONITOR_CLOCK, Separator};
 use crate::import::table::records::Records;
-use crate::import::words::names::{self, Sureness};
+use crate::import::words::names::{self, is_quantity};
 use crate::import::words::{DecimalMark, units};
 use crate::metadata::Metadata;
 
@@ -168,12 +168,6 @@ fn is_unit_line(cells: &[String]) -> bool {
 fn is_bracketed(cells: &[String]) -> bool {
     let mut filled = cells.iter().filter(|cell| !cell.is_empty()).peekable();
     filled.peek().is_some() && filled.all(|cell| cell.starts_with(['(', '[']) && cell.ends_with([')', ']']))
-}
-
-/// True if a name is that of a measured quantity.
-fn is_quantity(heading: &str) -> bool {
-    let (name, unit) = names::take_apart(heading);
-    matches!(names::role(&name, unit.as_deref()), Some((_, Sureness::Strong)))
 }
 
 fn has_twins(names: &[String]) -> bool {

@@ -44,16 +44,10 @@ fn of_object(pairs: Vec<(String, Json)>) -> Option<Rows<'static>> {
         rows.extend((1..).zip(data).map(|(number, row)| (number, cells_of(row))));
         return Some(rows);
     }
-    let is_column = |value: &Json| !list_of_cells(value).is_empty();
     let longest = pairs.iter().map(|(_, value)| list_of_cells(value).len()).max()?;
     if longest > 1 {
-        let columns: Vec<(String, Vec<Cell<'static>>)> = pairs
-            .into_iter()
-            .filter(|(_, value)| is_column(value))
-            .map(|(name, value)| (name, list_of_cells(&value)))
-            .collect();
-        let columns: Vec<_> =
-            columns.into_iter().filter(|(_, cells)| cells.len() == longest).take(MOST_COLUMNS).collect();
+        let columns = pairs.into_iter().map(|(name, value)| (name, list_of_cells(&value)));
+        let columns: Vec<_> = columns.filter(|(_, cells)| cells.len() == longest).take(MOST_COLUMNS).collect();
         let names = columns.iter().map(|(name, _)| Cell::Text(name.clone().into())).collect();
         let row = |row: usize| (row as u64 + 1, columns.iter().map(|(_, cells)| cells[row].clone()).collect());
         return Some([(1, names)].into_iter().chain((0..longest).map(row)).collect());

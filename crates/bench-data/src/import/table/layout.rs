@@ -1,3 +1,5 @@
+use std::collections::HashMap;
+
 use crate::import::table::grid::{SAMPLE, Separator, behind_arrow, split};
 use crate::import::words::{DecimalMark, Value, amount, is_stamp};
 
@@ -28,7 +30,7 @@ pub(crate) fn text_layout(
 
 /// Counts numbers minus texts, in lines of the best width. Numbers with marks of thousands count if `groups`.
 fn score(lines: &[&str], separator: Separator, mark: DecimalMark, groups: bool) -> i64 {
-    let mut by_width: Vec<(usize, i64)> = Vec::new();
+    let mut by_width = HashMap::<usize, i64>::new();
     for line in lines {
         let cells = split(line, separator);
         let (numbers, texts) = cells.iter().fold((0, 0), |(numbers, texts), cell| match kind(cell, mark, groups) {
@@ -39,12 +41,9 @@ fn score(lines: &[&str], separator: Separator, mark: DecimalMark, groups: bool) 
         if numbers == 0 {
             continue;
         }
-        match by_width.iter_mut().find(|(width, _)| *width == cells.len()) {
-            Some((_, score)) => *score += numbers - texts,
-            None => by_width.push((cells.len(), numbers - texts)),
-        }
+        *by_width.entry(cells.len()).or_default() += numbers - texts;
     }
-    by_width.into_iter().map(|(_, score)| score).max().unwrap_or(0)
+    by_width.into_values().max().unwrap_or(0)
 }
 
 fn kind(cell: &str, mark: DecimalMark, groups: bool) -> Value {

@@ -6,7 +6,7 @@ use crate::import::bytes::Cell;
 use crate::import::table::data::{Data, Shape};
 use crate::import::table::grid::{Grid, MONITOR_CLOCK, Separator, split};
 use crate::import::table::value::{number_of, value_of};
-use crate::import::words::names::{self, Sureness};
+use crate::import::words::names::{self, is_quantity};
 use crate::import::words::{DecimalMark, Value, is_stamp};
 
 /// Number of rows with which a line of numbers is compared.
@@ -115,12 +115,8 @@ impl Data {
         let is_open = 2 * given == width
             && separator == Some(Separator::Comma)
             && !grid.cells(data).iter().any(|cell| cell.to_string().contains('.'));
-        let is_quantity = |cell: &String| {
-            let (name, unit) = names::take_apart(cell);
-            matches!(names::role(&name, unit.as_deref()), Some((_, Sureness::Strong)))
-        };
-        let are_names =
-            given > 1 && cells.iter().all(|cell| is_heading(cell)) && cells.iter().take(width).any(is_quantity);
+        let has_quantity = cells.iter().take(width).any(|cell| is_quantity(cell));
+        let are_names = given > 1 && cells.iter().all(|cell| is_heading(cell)) && has_quantity;
         if !are_names || is_torn || is_open || 2 * given < width || given > 2 * width {
             return None;
         }

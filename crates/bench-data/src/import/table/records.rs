@@ -255,17 +255,13 @@ fn columns(names: &[String], rows: &[Record]) -> Vec<Column> {
 /// Returns the unit after every value of a label: `Some(None)` if there is none, or if they differ.
 fn units_of_all<'a>(labels: usize, rows: &[Record<'a>]) -> Vec<Option<Option<&'a str>>> {
     let mut units: Vec<Option<Option<&str>>> = vec![None; labels];
-    for (label, value) in rows.iter().flat_map(|row| &row.values) {
-        let unit = unit_behind(value);
-        if unit.is_some() || value_is_there(value) {
+    for (label, text) in rows.iter().flat_map(|row| &row.values) {
+        let unit = unit_behind(text);
+        // A missing value has no unit.
+        if unit.is_some() || value(text, DecimalMark::Point, 0, &[]) != Value::Missing {
             let known = units[*label].get_or_insert(unit);
             *known = known.filter(|known| Some(*known) == unit);
         }
     }
     units
-}
-
-/// True if a text is not a missing value, which would have no unit.
-fn value_is_there(text: &str) -> bool {
-    value(text, DecimalMark::Point, 0, &[]) != Value::Missing
 }

@@ -1,9 +1,6 @@
 //! Selection of a table's rows: those with a given value in a column, and those of one range.
 
-use std::ops::Range;
-
 use crate::error::quote;
-use crate::import::bytes::Cells;
 use crate::import::error::ImportError;
 use crate::import::table::columns::{Column, Table};
 use crate::import::table::options::RowFilter;
@@ -43,13 +40,14 @@ impl Table {
         Ok(())
     }
 
-    /// Returns the table with a range of its rows.
-    pub(crate) fn stretch(&self, rows: Range<usize>) -> Self {
-        self.rows(rows)
-    }
-
-    fn rows(&self, rows: impl Iterator<Item = usize> + Clone) -> Self {
-        let column = |column: &Column| Column { cells: column.cells.some(rows.clone()), ..without_cells(column) };
+    /// Returns the table with some of its rows.
+    pub(crate) fn rows(&self, rows: impl Iterator<Item = usize> + Clone) -> Self {
+        let column = |Column { name, heading, unit, cells }: &Column| Column {
+            name: name.clone(),
+            heading: heading.clone(),
+            unit: unit.clone(),
+            cells: cells.some(rows.clone()),
+        };
         Self {
             file: self.file.clone(),
             layout: self.layout.clone(),
@@ -69,11 +67,6 @@ impl Table {
         }
         values
     }
-}
-
-fn without_cells(column: &Column) -> Column {
-    let Column { name, heading, unit, .. } = column;
-    Column { name: name.clone(), heading: heading.clone(), unit: unit.clone(), cells: Cells::default() }
 }
 
 fn is_same_number(cell: &str, value: &str) -> bool {

@@ -2,15 +2,14 @@
 
 use std::io::{self, Write};
 
+use crate::columns::Column;
 use crate::import::error::{ImportError, quoted};
 use crate::import::roles::{ColumnName, FileColumn, Recipe, candidates, refer};
 use crate::import::table::Table;
 use crate::import::trace::{Imported, Plan};
 use crate::import::words::{Role, names};
 use crate::metadata::Metadata;
-use crate::row::{ReadingKind, ReferenceQuantity};
 use crate::rows::RowWriter;
-use crate::trace::Trace;
 
 /// Import of several channels.
 #[derive(Clone, Debug, PartialEq)]
@@ -127,16 +126,15 @@ impl EachPlan {
         metadata.other.retain(|(key, _)| key != "made_by" && !key.ends_with("_zero"));
         let (mut columns, mut values) = (vec!["time_s".to_owned()], vec![time_s]);
         for (channel, Imported { trace, remarks: own, .. }) in self.channels.iter().zip(&imported) {
-            columns.push(format!("{}_{}", channel.name, unit(trace)));
-            values.push(readings_of(trace));
+            // A resistance is `_ohm` or `_ratio`, a code `_adc`.
+            let unit = trace.readings.column().name().trim_start_matches("resistance_");
+            columns.push(format!("{}_{unit}", channel.name));
+            values.push((0..trace.len()).map(|row| trace.readings.written(row)).collect());
             remarks.extend(own.iter().filter(|remark| !remarks.contains(remark)).cloned().collect::<Vec<_>>());
         }
         for (channel, Imported { trace, .. }) in self.channels.iter().zip(imported) {
             let Some(reference) = trace.reference else { continue };
-            let quantity = match reference.quantity {
-                ReferenceQuantity::Strain => "strain",
-                ReferenceQuantity::AngleDeg => "angle_deg",
-            };
+            let quantity = Column::of_reference(reference.quantity).name();
             columns.push(if self.is_shared() { quantity.to_owned() } else { format!("{}_{quantity}", channel.name) });
             values.push(reference.values);
             if self.is_shared() {
@@ -258,21 +256,4 @@ fn names_of(tables: &[Table], plans: &[Plan]) -> Vec<String> {
         if is_double { format!("{name}_{}", place + 1) } else { name.clone() }
     };
     found.iter().enumerate().map(own).collect()
-}
-
-/// Returns the suffix of a column of readings.
-const fn unit(trace: &Trace) -> &'static str {
-    match (&trace.readings.converter, trace.readings.kind) {
-        (Some(_), _) => "adc",
-        (None, ReadingKind::Ohm) => "ohm",
-        (None, ReadingKind::Ratio) => "ratio",
-    }
-}
-
-/// Returns the readings as written: codes of a converter, or values.
-fn readings_of(trace: &Trace) -> Vec<f64> {
-    match &trace.readings.converter {
-        Some(converter) => converter.codes.iter().map(|code| code.map_or(f64::NAN, f64::from)).collect(),
-        None => trace.readings.values.clone(),
-    }
 }

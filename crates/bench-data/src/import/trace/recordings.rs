@@ -25,7 +25,7 @@ impl Plan {
             let what = "several recordings are taken apart in one file, whose reference stands beside the readings";
             return Err(ImportError::unreadable(&tables[0].file, what));
         }
-        Ok(ranges.into_iter().map(|rows| tables.iter().map(|table| table.stretch(rows.clone())).collect()).collect())
+        Ok(ranges.into_iter().map(|rows| tables.iter().map(|table| table.rows(rows.clone())).collect()).collect())
     }
 
     /// Returns the rows of each recording.

@@ -175,11 +175,7 @@ fn allan(time_s: &[f64], values: &[f64]) -> Vec<Allan> {
 fn phase_survey(time_s: &[f64], segments: Vec<Segment>) -> PhaseSurvey {
     let mut out = PhaseSurvey::default();
     for segment in &segments {
-        let phase = &mut out.phases[match segment.phase {
-            Phase::Extend => 0,
-            Phase::Hold => 1,
-            Phase::Retract => 2,
-        }];
+        let phase = &mut out.phases[segment.phase.index()];
         phase.0 += 1;
         phase.1 += duration(time_s, segment);
     }

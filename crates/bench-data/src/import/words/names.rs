@@ -167,6 +167,12 @@ pub(crate) fn role(name: &str, unit: Option<&str>) -> Option<(Role, Sureness)> {
     by_name(name, fits).or_else(|| by_unit(name, unit?))
 }
 
+/// True if a heading is that of a measured quantity.
+pub(crate) fn is_quantity(heading: &str) -> bool {
+    let (name, unit) = take_apart(heading);
+    matches!(role(&name, unit.as_deref()), Some((_, Sureness::Strong)))
+}
+
 /// Returns the role of a name among the fitting ones: by the whole name, a part of it, or the whole name apart from an index or a short
 /// word after it.
 fn by_name(name: &str, fits: impl Fn(Role) -> bool) -> Option<(Role, Sureness)> {

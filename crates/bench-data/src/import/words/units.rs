@@ -101,7 +101,7 @@ impl Role {
     /// Returns the names of its units in flags; none for a role whose numbers have no unit.
     #[must_use]
     pub fn units(self) -> Vec<&'static str> {
-        names(self)
+        UNITS.iter().filter(|(of, ..)| *of == self.quantity()).map(|(_, name, ..)| *name).collect()
     }
 }
 
@@ -221,11 +221,6 @@ pub(crate) fn epoch_unit(count: f64, step: f64) -> Option<&'static str> {
         CENTURY_S.contains(&(count / per_second)) && step / per_second <= LONGEST_STEP_S
     };
     [("s", 1.0), ("ms", 1e3), ("us", 1e6), ("ns", 1e9)].iter().find(fits).map(|(name, _)| *name)
-}
-
-/// Returns the names of a quantity's units, for answers.
-pub(crate) fn names(role: Role) -> Vec<&'static str> {
-    UNITS.iter().filter(|(of, ..)| *of == role.quantity()).map(|(_, name, ..)| *name).collect()
 }
 
 #[cfg(test)]

@@ -19,7 +19,7 @@ use plan::Job;
 use rayon::ThreadPoolBuilder;
 use workshop::Workshop;
 
-use crate::args::{BatchArgs, SummaryForm};
+use crate::args::{BatchArgs, SummaryForm, name_of};
 use crate::error::CliError;
 use crate::messages::Messages;
 use crate::output::{Kind, Outputs};
@@ -29,7 +29,7 @@ use crate::progress::Progress;
 pub fn run(args: &BatchArgs, messages: &Messages) -> Result<(), CliError> {
     let jobs = plan::jobs(args)?;
     plan::check_sensor(&jobs, args)?;
-    let path = |form: SummaryForm| args.output.join(format!("{}.{}", summary::SUMMARY, form.name()));
+    let path = |form: SummaryForm| args.output.join(format!("{}.{}", summary::SUMMARY, name_of(form)));
     let mut outputs = Outputs::new(args.force, jobs.iter().flat_map(Job::inputs));
     outputs.folder(&args.output)?;
     let claim = outputs.claim_table(&path(args.summary), Kind::Summary, &summary::columns())?;

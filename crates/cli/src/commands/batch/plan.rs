@@ -8,7 +8,7 @@ use ohmstrain_sensor::EstimatorKind;
 
 use super::journal::{JOURNAL, Journal};
 use super::summary::SUMMARY;
-use crate::args::{Args, BatchArgs, BatchCommand, Command, Estimators, Format};
+use crate::args::{Args, BatchArgs, BatchCommand, Command, Estimators, Format, name_of};
 use crate::commands::hand::description;
 use crate::commands::hand::joints;
 use crate::error::CliError;
@@ -51,7 +51,7 @@ impl Job {
 
     /// Parses the command line of this job as a person would type it, without the output.
     pub fn parsed(&self, args: &BatchArgs) -> Result<Args, clap::Error> {
-        let mut words = vec!["ohmstrain".to_owned(), args.command.name().to_owned()];
+        let mut words = vec!["ohmstrain".to_owned(), name_of(args.command)];
         if args.command == BatchCommand::Calibrate {
             words.extend(["-o".to_owned(), "sensor.toml".to_owned()]);
         }
@@ -61,7 +61,7 @@ impl Job {
         }
         match args.command {
             BatchCommand::Filter | BatchCommand::Smooth => {
-                words.extend(["--format".to_owned(), args.format.name().to_owned()]);
+                words.extend(["--format".to_owned(), name_of(args.format)]);
             }
             BatchCommand::Evaluate | BatchCommand::Calibrate => words.push("--json".to_owned()),
             BatchCommand::Hand => {}
@@ -185,9 +185,9 @@ impl ManifestRow<'_> {
 
 /// Names the outputs that have no name after the recordings' paths below their common folder.
 fn name_outputs(jobs: &mut [Job], args: &BatchArgs) {
-    let ending = match args.command {
-        BatchCommand::Filter | BatchCommand::Smooth => args.format.name(),
-        BatchCommand::Hand => Format::Csv.name(),
+    let ending: &str = match args.command {
+        BatchCommand::Filter | BatchCommand::Smooth => &name_of(args.format),
+        BatchCommand::Hand => "csv",
         BatchCommand::Evaluate => "json",
         BatchCommand::Calibrate => "toml",
     };
@@ -229,7 +229,8 @@ fn check_arguments(job: &mut Job, args: &BatchArgs) -> Result<(), CliError> {
     let parsed = job.parsed(args).map_err(|error| {
         let text = error.to_string();
         let text = text.lines().map(str::trim).take_while(|line| !line.is_empty()).collect::<Vec<_>>().join(" ");
-        let answer = renamed::answer(&error, args.command.name()).map_or(String::new(), |answer| format!(": {answer}"));
+        let answer =
+            renamed::answer(&error, &name_of(args.command)).map_or(String::new(), |answer| format!(": {answer}"));
         CliError::Arguments(format!("{}: {}{answer}", job.name(), text.trim_start_matches("error: ")))
     })?;
     let (output, beside) = match parsed.command {

@@ -10,7 +10,7 @@ use std::time::Instant;
 use super::journal::{Entry, Journal, State};
 use super::plan::Job;
 use super::scores::Figures;
-use crate::args::{BatchArgs, Command};
+use crate::args::{BatchArgs, Command, name_of};
 use crate::commands::evaluate::{self, Evaluation};
 use crate::commands::hand::{self, description};
 use crate::commands::{calibrate, filter, smooth};
@@ -45,7 +45,7 @@ impl<'a> Workshop<'a> {
     /// Returns the entry of a job before it runs.
     pub fn entry(&self, job: &Job) -> Entry {
         Entry {
-            command: self.args.command.name().to_owned(),
+            command: name_of(self.args.command),
             files: job.files.clone(),
             sensor: job.sensor.clone(),
             flags: job.flags.clone(),

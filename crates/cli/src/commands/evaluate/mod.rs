@@ -90,9 +90,7 @@ fn with_splits(args: &EvaluateArgs, evaluation: &mut Evaluation, messages: &Mess
     for path in &args.traces {
         let recording = read(args, path)?;
         for &split in &args.calibration.split {
-            let (scores, drawn) = with_split(args, &recording, split, &progress)?;
-            evaluation.add(scores);
-            evaluation.drawn = evaluation.drawn.take().or(drawn);
+            add_until_error(evaluation, vec![with_split(args, &recording, split, &progress)], messages)?;
         }
     }
     Ok(())
@@ -104,7 +102,7 @@ fn with_split(
     recording: &TraceFile,
     split: Split,
     progress: &Progress,
-) -> Result<(Vec<RecordingScores>, Option<Drawn>), CliError> {
+) -> Result<Judged, CliError> {
     let rows = recording.trace.len();
     let training = [recording.rows(split.training(rows))];
     let (sensors, rivals) = calibrated(&training, args, progress)?;
@@ -112,11 +110,11 @@ fn with_split(
     let lag_s = reference_lag(&recording.samples()?).ok().map(|lag| lag.lag_s);
     let (scored, time_at) = (split.scored(rows), |row: usize| recording.trace.time_s.get(row).copied());
     let part = Scored { from_s: time_at(scored.start), until_s: time_at(scored.end) };
-    let Judged { mut scores, drawn, .. } = judge(args, recording, part, &sensors, &rivals)?;
-    for scores in &mut scores {
+    let mut judged = judge(args, recording, part, &sensors, &rivals)?;
+    for scores in &mut judged.scores {
         (scores.lag_s, scores.split) = (Some(lag_s), Some(split.to_string()));
     }
-    Ok((scores, drawn))
+    Ok(judged)
 }
 
 /// Evaluates some recordings with parameters from others.
@@ -237,7 +235,7 @@ fn judge(
         Sample::of(&recording.trace.time_s, &recording.sha256, first.params(), part)
     };
     for sensor in sensors {
-        let of_whole = args.known_every.filter(|_| !sensor.is_part());
+        let of_whole = args.known_every.filter(|_| !sensor.is_part);
         for given in KnownStrains::cases(recording, part, sensor.sensor.params().limits, of_whole) {
             let scores = sensor.judge(recording, part, rest, &given, baselines, &mut judged.warnings)?;
             judged.scores.push(RecordingScores { sample, ..scores.ok_or_else(nothing)? });

@@ -26,7 +26,7 @@ pub struct JudgedSensor {
     /// Wall-clock time of the calibration, s; `None` if it was read from a file.
     calibration_s: Option<f64>,
     /// True if it is shown as a part of another one.
-    is_part: bool,
+    pub is_part: bool,
     /// Name of the scores: the estimator's name, or that of the part left out.
     name: &'static str,
 }
@@ -97,11 +97,6 @@ impl JudgedSensor {
         let sensors = calibrated.into_iter().flatten().flatten();
         // A part that was requested by itself is not shown twice.
         Ok(sensors.filter(|sensor| !(sensor.is_part && wanted.contains(&sensor.kind))).collect())
-    }
-
-    /// True if it is shown as a part of another one.
-    pub const fn is_part(&self) -> bool {
-        self.is_part
     }
 
     /// Scores some rows of a recording, with the filter started at the first row and given the strains of `given`; `None`

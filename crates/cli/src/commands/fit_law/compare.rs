@@ -47,7 +47,7 @@ pub fn compare(recordings: &[TraceFile], args: &FitLawArgs, messages: &Messages)
             let own = FitLawArgs { law: *law, compare: vec![], ..args.clone() };
             tried.push((law.to_string(), fit_recording(recording, &own, messages)?));
         }
-        tried.iter().for_each(|(law, fits)| output::warn_of_law(fits, law, messages));
+        tried.iter().for_each(|(law, fits)| output::warn(fits, &format!("{law}: "), messages));
         ranked.extend(rank(&tried)?);
     }
     if args.json {

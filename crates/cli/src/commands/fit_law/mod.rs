@@ -58,7 +58,7 @@ pub fn run(args: &FitLawArgs, messages: &Messages) -> Result<(), CliError> {
     }
     let fits: Vec<Fits> =
         recordings.iter().map(|recording| fit_recording(recording, args, messages)).collect::<Result<_, _>>()?;
-    output::warn(&fits, messages);
+    fits.iter().for_each(|fits| output::warn(fits, "", messages));
     if args.table {
         published::warn(&fits, messages);
     }

@@ -152,17 +152,8 @@ pub const POOR: f64 = 0.9;
 /// Number of segments with a warning of their own; further ones are only counted.
 const MOST_WARNED: usize = 6;
 
-/// Warns of fits that are poor, did not converge, or end at a limit of the search.
-pub fn warn(recordings: &[Fits], messages: &Messages) {
-    recordings.iter().for_each(|recording| warn_of(recording, "", messages));
-}
-
-/// Does the same for one law of several.
-pub fn warn_of_law(recording: &Fits, law: &str, messages: &Messages) {
-    warn_of(recording, &format!("{law}: "), messages);
-}
-
-fn warn_of(recording: &Fits, law: &str, messages: &Messages) {
+/// Warns of fits that are poor, did not converge, or end at a limit of the search; `law` precedes the text of each.
+pub fn warn(recording: &Fits, law: &str, messages: &Messages) {
     let name = &recording.name;
     let doubts: Vec<(&str, Vec<String>)> =
         recording.fits.iter().map(doubts).filter(|(_, doubts)| !doubts.is_empty()).collect();

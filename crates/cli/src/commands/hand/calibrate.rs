@@ -161,10 +161,10 @@ impl Group {
         let mut calibrated = Vec::new();
         for (channel, traces) in self.channels.iter().zip(&recordings) {
             let progress = Progress::new("calibrating", messages);
-            messages.detail(&format!("channel `{}`", channel.column));
-            calibrated.push(
-                calibrate_recordings(traces, calibration(args), &progress).map_err(|error| named(error, channel))?,
-            );
+            let name = format!("channel `{}`", channel.column);
+            messages.detail(&name);
+            let found = calibrate_recordings(traces, calibration(args), &progress);
+            calibrated.push(found.map_err(|error| error.named(&name))?);
         }
         let mut entries = Vec::new();
         for (k, (path, claim)) in files.sensors.into_iter().enumerate() {
@@ -204,8 +204,9 @@ impl Group {
         for channel in &self.channels {
             let mut traces = self.traces(args, tables, channel)?;
             let marked = marks::of_recordings(&traces, &[])?;
-            for remark in marks::take(&mut traces, &marked).map_err(|error| named(error, channel))? {
-                messages.remark(&format!("channel `{}`: {remark}", channel.column));
+            let name = format!("channel `{}`", channel.column);
+            for remark in marks::take(&mut traces, &marked).map_err(|error| error.named(&name))? {
+                messages.remark(&format!("{name}: {remark}"));
             }
             recordings.push(traces);
         }
@@ -238,14 +239,6 @@ impl Group {
 fn mean_variance(sd: &[f64]) -> Option<f64> {
     let (count, sum) = sd.iter().filter(|sd| sd.is_finite()).fold((0.0, 0.0), |(n, sum), sd| (n + 1.0, sum + sd * sd));
     (count > 0.0).then(|| sum / count)
-}
-
-/// Adds the channel to an error.
-fn named(error: CliError, channel: &Channel) -> CliError {
-    match error {
-        CliError::Input(text) => CliError::Input(format!("channel `{}`: {text}", channel.column)),
-        other => other,
-    }
 }
 
 /// Fuses the channels of a joint; `recordings` are those of each channel.

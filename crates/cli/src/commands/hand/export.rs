@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use ohmstrain::SensorParams;
+use ohmstrain::{FusedSensor, SensorParams};
 use ohmstrain_bench_data::FrontEndSpec;
 use ohmstrain_export::{Divider, ExportTarget, HandChannel, HandFirmware, HandJoint};
 use ohmstrain_model::SensorSide;
@@ -64,7 +64,7 @@ fn exported<'j>(joint: &'j Joint) -> HandJoint<'j> {
     HandJoint {
         name: joint.name.into(),
         channels: joint.channels.iter().map(channel).collect(),
-        fusion: joint.fusion_params(),
+        fusion: joint.fusion.as_ref().map(FusedSensor::params),
         joint: joint.channels.iter().find_map(|channel| channel.sensor.params().joint),
     }
 }

@@ -2,8 +2,8 @@ use std::path::Path;
 
 use ohmstrain::trace::{self, FIRST_LIVE_READINGS, HandChannel, HandJoint, reading_column};
 use ohmstrain::{
-    Error, Estimate, Filter, FilterBuilder, FusedEstimate, FusedFilter, FusedSensor, FusionParams, Quantity, Reading,
-    ReadingUnit, Sensor, UnitGuess,
+    Error, Estimate, Filter, FilterBuilder, FusedEstimate, FusedFilter, FusedSensor, Quantity, Reading, ReadingUnit,
+    Sensor, UnitGuess,
 };
 use ohmstrain_bench_data::{LineParser, Metadata};
 
@@ -17,7 +17,7 @@ pub struct Joint<'a> {
     pub name: &'a str,
     pub channels: Vec<Channel<'a>>,
     /// Fusion of the channels; `None` for a joint with one.
-    fusion: Option<FusedSensor>,
+    pub fusion: Option<FusedSensor>,
     filter: JointFilter,
 }
 
@@ -83,11 +83,6 @@ impl<'a> Joint<'a> {
         self.channels.iter().all(|channel| params(channel) == (Quantity::Strain, true))
     }
 
-    /// Returns the parameters of its fusion; `None` for a joint with one channel.
-    pub fn fusion_params(&self) -> Option<&FusionParams> {
-        self.fusion.as_ref().map(FusedSensor::params)
-    }
-
     /// Returns the quantity that its sensors were calibrated on.
     pub fn quantity(&self) -> Quantity {
         self.channels.first().map_or(Quantity::Strain, |channel| channel.sensor.params().quantity)
@@ -145,7 +140,8 @@ impl<'a> Joint<'a> {
     /// Returns the row of a joint with one channel.
     fn alone(&self, estimate: Estimate) -> JointRow {
         let flags = estimate.flags.names().map(|flag| format!("{}:{flag}", self.name)).collect();
-        let (value, sd) = angle(&estimate);
+        let value = estimate.angle_deg.unwrap_or(estimate.strain);
+        let sd = estimate.angle_sd.unwrap_or(estimate.strain_sd);
         let (strain, strain_sd) = (estimate.strain, estimate.strain_sd);
         JointRow { value, sd, strain, strain_sd, flags, channels: vec![estimate] }
     }
@@ -185,23 +181,12 @@ fn joined(mut filters: Vec<Filter>, fusion: Option<&FusedSensor>) -> Result<Join
     }
 }
 
-/// Returns the angle and its standard deviation, degrees: by the joint, or as calibrated.
-fn angle(estimate: &Estimate) -> (f64, f64) {
-    match (estimate.angle_deg, estimate.angle_sd) {
-        (Some(angle), Some(sd)) => (angle, sd),
-        _ => (estimate.strain, estimate.strain_sd),
-    }
-}
-
 impl<'a> Channel<'a> {
     fn new(joint: &'a HandJoint, entry: &'a HandChannel, folder: &Path, file: &str) -> Result<Self, CliError> {
         // Readings of a hand are not converted to one temperature.
         let mut sensor = sensor_file::read(&folder.join(&entry.sensor), None)?.without_temperature();
-        if let Some(spec) = joint.joint {
-            let metadata = Metadata { joint: Some(spec), ..Metadata::default() };
-            if let Some(joint) = trace::joint(&metadata) {
-                sensor = sensor.on_joint(joint)?;
-            }
+        if let Some(joint) = trace::joint(&Metadata { joint: joint.joint, ..Metadata::default() }) {
+            sensor = sensor.on_joint(joint)?;
         }
         if let Some(measured) = entry.rest_resistance {
             let refused = |error| CliError::Input(format!("joint `{}`: rest_resistance: {error}", joint.name));

@@ -8,6 +8,7 @@ use ohmstrain_bench_data::{Line, ParquetText, Row};
 
 use super::joint::{Channel, Joint};
 use crate::error::CliError;
+use crate::readings::no_row;
 use crate::whole_file::is_stdin;
 
 /// Longest line, bytes; anything longer is not a row.
@@ -165,7 +166,6 @@ impl HandLines {
 
     /// Returns the error of a recording without a row.
     pub fn no_row(&self) -> CliError {
-        let none = "expected at least one row of data, found the end of the file";
-        CliError::Input(format!("{}:{}: {none}", self.file, self.number + 1))
+        no_row(&self.file, self.number)
     }
 }

@@ -39,7 +39,7 @@ pub fn run(args: &HandArgs, messages: &Messages) -> Result<u64, CliError> {
     let streamed = stream(args, &mut lines, &mut joints, &columns, &mut out, messages);
     out.flush()?;
     let written = streamed?;
-    rows_out.publish()?;
+    rows_out.outputs.publish()?;
     Ok(written)
 }
 

@@ -60,6 +60,6 @@ pub fn run(args: &SmoothArgs, messages: &Messages) -> Result<u64, CliError> {
     }
     out.flush()?;
     drop(out);
-    rows_out.publish()?;
+    rows_out.outputs.publish()?;
     Ok(time_s.len() as u64)
 }

@@ -3,7 +3,7 @@
 use std::io;
 
 use ohmstrain::number::median;
-use ohmstrain::trace::{HandDescription, LEAST_AT_REST, REST_S};
+use ohmstrain::trace::HandDescription;
 use ohmstrain_bench_data::{Headed, Metadata, Row};
 
 use super::Shown;
@@ -83,12 +83,8 @@ impl<'a> HandSession<'a> {
 
     /// Returns the median of a channel's readings in the last second, or of the last few; `None` if it is not read now.
     fn rested(&self, channel: usize) -> Option<f64> {
-        let last_s = self.track.points.back().filter(|last| last.readings[channel].is_finite())?.time_s;
-        let known = || self.track.points.iter().rev().filter(|point| point.readings[channel].is_finite());
-        let recent: Vec<f64> =
-            known().take_while(|point| point.time_s >= last_s - REST_S).map(|point| point.readings[channel]).collect();
-        let few = || known().take(LEAST_AT_REST).map(|point| point.readings[channel]).collect();
-        median(if recent.len() < LEAST_AT_REST { few() } else { recent })
+        self.track.points.back().filter(|last| last.readings[channel].is_finite())?;
+        median(self.track.at_rest(|point| point.readings[channel]))
     }
 }
 

@@ -33,7 +33,7 @@ impl Timed for Point {
 pub struct Session<'a> {
     pub args: &'a LiveArgs,
     /// The sensor, on the joint of the last header that named one.
-    sensor: Sensor,
+    pub sensor: Sensor,
     lines: LineParser,
     filter: WatchedFilter,
     headed: Headed,
@@ -73,11 +73,6 @@ impl<'a> Session<'a> {
             }
         }
         Ok(session)
-    }
-
-    /// The sensor.
-    pub const fn sensor(&self) -> &Sensor {
-        &self.sensor
     }
 
     /// Begins another stream after a header.

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use ohmstrain::trace::REST_S;
+use ohmstrain::trace::{LEAST_AT_REST, REST_S};
 
 use super::pulse::Pulse;
 use super::recorder::Recorder;
@@ -51,6 +51,14 @@ impl<P: Timed> Track<P> {
         while self.marks.front().is_some_and(|mark_s| *mark_s < oldest_s) {
             self.marks.pop_front();
         }
+    }
+
+    /// Returns the known readings of the last second, or at least the last few.
+    pub fn at_rest(&self, reading: impl Fn(&P) -> f64) -> Vec<f64> {
+        let known = || self.points.iter().rev().filter(|point| reading(point).is_finite());
+        let is_recent = |point: &&P| self.points.back().is_some_and(|last| point.time_s() >= last.time_s() - REST_S);
+        let count = known().take_while(is_recent).count().max(LEAST_AT_REST);
+        known().take(count).map(&reading).collect()
     }
 
     /// Forgets everything that depends on time, for another clock.

@@ -70,8 +70,8 @@ impl Around<'_> {
 }
 
 fn draw_plot(frame: &mut Frame, session: &Session, window_s: f64, area: Rect) {
-    let (factor, unit) = shown(session.sensor().params().quantity);
-    let limits = session.sensor().params().limits;
+    let (factor, unit) = shown(session.sensor.params().quantity);
+    let limits = session.sensor.params().limits;
     let every = session.track.points.len().div_ceil(MOST_DRAWN).max(1);
     let line = |offset: f64| -> Vec<(f64, f64)> {
         let points = session.track.points.iter().step_by(every);
@@ -90,7 +90,7 @@ fn draw_plot(frame: &mut Frame, session: &Session, window_s: f64, area: Rect) {
         dataset(&mean, Color::Cyan, GraphType::Line),
         dataset(&marks, Color::Yellow, GraphType::Scatter).marker(Marker::Block),
     ];
-    let name = match session.sensor().params().quantity {
+    let name = match session.sensor.params().quantity {
         Quantity::Strain => "strain",
         Quantity::AngleDeg => "angle",
     };
@@ -127,7 +127,7 @@ pub fn of_stream(pulse: &Pulse, recorder: Option<&Recorder>, line: &mut impl FnM
 }
 
 fn of_estimate(session: &Session, row: &Estimate, line: &mut impl FnMut(&str, String)) {
-    let (factor, unit) = shown(session.sensor().params().quantity);
+    let (factor, unit) = shown(session.sensor.params().quantity);
     let name = if unit == "°" { "angle" } else { "strain" };
     line(name, format!("{:.2} ± {:.2}{unit}", factor * row.strain, factor * 1.96 * row.strain_sd));
     if let (Some(angle), Some(sd)) = (row.angle_deg, row.angle_sd) {
@@ -140,7 +140,7 @@ fn of_estimate(session: &Session, row: &Estimate, line: &mut impl FnMut(&str, St
             line(name, format!("{}{} {:3.0} %", "█".repeat(full), "·".repeat(BAR - full), 100.0 * share));
         }
     }
-    let reading_unit = match session.sensor().params().reading {
+    let reading_unit = match session.sensor.params().reading {
         ReadingUnit::Ohm => " Ω",
         ReadingUnit::Ratio => "",
     };

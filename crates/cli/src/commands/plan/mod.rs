@@ -7,7 +7,7 @@ mod worth;
 use std::path::Path;
 
 use comfy_table::ColumnConstraint;
-use ohmstrain::{Calibration, EstimatorKind, JointParams, Sensor};
+use ohmstrain::{Calibration, EstimatorKind, Sensor, trace};
 use ohmstrain_bench_data::simulate::{Protocol, SimulationSettings};
 use ohmstrain_bench_data::{Metadata, ReferenceQuantity};
 use serde::Serialize;
@@ -25,7 +25,7 @@ use crate::protocol_file;
 use crate::sensor_file;
 use motion::Protocols;
 use ohmstrain::number::{self, fixed, significant};
-use worth::{Information, Sampling, Worth};
+use worth::{Information, Sampling};
 
 /// Version of the output of `--json`.
 const SCHEMA: u32 = 1;
@@ -35,11 +35,8 @@ const SCHEMA: u32 = 1;
 struct Json<'a> {
     sensor: String,
     recordings: &'a [Information],
-    sampling: &'a [Worth],
-    /// Error at the fastest of these rates, with drift as the only disturbance, percent.
-    drift_alone_percent: f64,
-    noise_alone_percent: f64,
-    neither_percent: f64,
+    #[serde(flatten)]
+    sampling: &'a Sampling,
 }
 
 /// Plans a recording.
@@ -51,11 +48,7 @@ pub fn run(args: &PlanArgs, messages: &Messages) -> Result<(), CliError> {
         Some(path) => (sensor_file::read(path, None)?, path.display().to_string()),
         None => (illustrative(args, messages)?, format!("an illustrative sensor ({})", args.material)),
     };
-    let joint = args.joint.map(|joint| JointParams {
-        prestrain: joint.prestrain,
-        moment_arm_mm: joint.moment_arm_mm,
-        gauge_length_mm: joint.gauge_length_mm,
-    });
+    let joint = trace::joint(&Metadata { joint: args.joint, ..Metadata::default() });
     let sensor = joint.map_or(Ok(sensor.clone()), |joint| sensor.on_joint(joint))?;
     let progress = Progress::new("planning", messages);
     let protocols = Protocols::new(sensor.params());
@@ -65,16 +58,7 @@ pub fn run(args: &PlanArgs, messages: &Messages) -> Result<(), CliError> {
     drop(progress);
     print(|out| {
         if args.json {
-            let Sampling { cases, drift_alone_percent, noise_alone_percent, neither_percent } = &worth;
-            let json = Json {
-                sensor: name,
-                recordings: &information,
-                sampling: cases,
-                drift_alone_percent: *drift_alone_percent,
-                noise_alone_percent: *noise_alone_percent,
-                neither_percent: *neither_percent,
-            };
-            return output::json(out, SCHEMA, &json);
+            return output::json(out, SCHEMA, &Json { sensor: name, recordings: &information, sampling: &worth });
         }
         Ok(out.write_all(text(&sensor, &name, &protocols, &information, &worth).as_bytes())?)
     })

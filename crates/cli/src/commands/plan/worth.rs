@@ -69,6 +69,7 @@ pub struct Worth {
 /// Errors of several sampling schemes, and those that no scheme reduces.
 #[derive(Serialize)]
 pub struct Sampling {
+    #[serde(rename = "sampling")]
     pub cases: Vec<Worth>,
     /// Error at [`FASTEST_HZ`] with drift as the only disturbance, percent of the sensor's range.
     pub drift_alone_percent: f64,

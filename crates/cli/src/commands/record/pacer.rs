@@ -153,17 +153,14 @@ impl Pacer {
             return plain(if self.pacing.steps.is_empty() { "mark by hand".into() } else { "done".into() });
         };
         let gone_s = time_s - current.begun_s;
-        let (what, from_s, until_s) = if gone_s < current.step.move_s {
-            ("to", 0.0, current.step.move_s)
+        let (what, time, from_s, until_s) = if gone_s < current.step.move_s {
+            ("to", "in", 0.0, current.step.move_s)
         } else {
-            ("hold", current.step.move_s, current.step.duration_s())
+            ("hold", "for", current.step.move_s, current.step.duration_s())
         };
         let share = ((gone_s - from_s) / (until_s - from_s)).clamp(0.0, 1.0);
         let duration = ohmstrain::number::significant(until_s - from_s, 2);
-        let text = match what {
-            "to" => format!("to {} in {duration} s", name(current.step.to)),
-            _ => format!("hold {} for {duration} s", name(current.step.to)),
-        };
+        let text = format!("{what} {} {time} {duration} s", name(current.step.to));
         Instruction { text, share, left_s: (until_s - gone_s).max(0.0) }
     }
 
