@@ -46,7 +46,7 @@ fn a_zero_forgets_strains_known_before_it() {
     assert!((told.strain - 0.1).abs() < 0.01, "{}", told.strain);
 }
 
-/// Where fewer than five readings came within a second, as with gaps, the last five known ones are the zero; a second zero at once has the
+/// The last five known readings are the zero if fewer came within a second, as with gaps; a second zero at once has the
 /// same ones. Without a reading, before the first one or after another header, nothing changes, and the sentence says so.
 #[test]
 fn a_zero_needs_five_known_readings_or_takes_the_last() {

@@ -72,10 +72,10 @@ impl WatchedFilter {
     }
 
     /// Begins anew with another filter, for another clock or header; R₀, the first readings and the last temperature remain. Without
-    /// temperatures, intervals are wider by the effect of the calibration's on the strain; returns a remark if they are.
+    /// temperatures, intervals are wider by the effect of the calibration's temperatures on the strain; returns a remark if they are.
     ///
     /// # Errors
-    /// As [`FilterBuilder::build`]. The filter then stays as it was.
+    /// As [`FilterBuilder::build`], and the filter then stays as it was; as [`Filter::know`], if a rest came before the first row.
     pub fn begin(&mut self, wanted: FilterBuilder, has_temperature: bool) -> Result<Option<&'static str>, Error> {
         let (sensor, known) = (wanted.sensor.clone(), wanted.known);
         let is_wider = sensor.params().temperature.is_some() && !has_temperature;
