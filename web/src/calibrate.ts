@@ -11,6 +11,7 @@ const ESTIMATORS: [string, string][] = [
   ["ekf", "ekf (a second or two)"],
   ["sign-split", "sign-split"],
   ["hypotheses", "hypotheses"],
+  ["static-cubic", "static-cubic"],
 ];
 
 const chosen = { estimator: "auto", from: "", until: "", align: false, channel: "" };

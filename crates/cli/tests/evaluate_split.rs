@@ -233,7 +233,7 @@ fn all_estimators_of_a_sensor_file_are_those_it_has_parameters_for() {
     let bench = simulated_for("60", &["1"]);
     bench.run(&["calibrate", "1.csv", "--until", CALIBRATED_UNTIL, "--estimator", "ukf", "-o", "sensor.toml"]).ok();
     let scores = evaluate(&bench, &["1.csv", "--sensor", "sensor.toml", "--estimator", "all"]);
-    assert_eq!(scores.iter().map(|scores| &scores["estimator"]).collect::<Vec<_>>(), ["ekf", "ukf"]);
+    assert_eq!(scores.iter().map(|scores| &scores["estimator"]).collect::<Vec<_>>(), ["ekf", "ukf", "static-cubic"]);
     let alone = evaluate(&bench, &["1.csv", "--sensor", "sensor.toml", "--estimator", "ekf"]);
     assert_same_scores(&scores[0], &alone[0]);
 }

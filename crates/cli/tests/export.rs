@@ -428,7 +428,7 @@ fn what_has_no_exported_form_is_refused_and_nothing_is_written() {
         bench.run(&[&["export", "--sensor", sensor, "--target", "c", "-o", "out"], more].concat())
     };
     c("sensor.toml", &["--dt-s", DT_S, "--estimator", "imm"])
-        .fails(2, "--estimator: expected corrected, sign-split, hypotheses or ekf, found imm");
+        .fails(2, "--estimator: expected corrected, sign-split, hypotheses, ekf or static-cubic, found imm");
     let sensor = bench.read("sensor.toml");
     let longest = sensor.lines().find_map(|line| line.strip_prefix("duration_s = ")).unwrap();
     c("sensor.toml", &["--dt-s", "1e6"]).fails(

@@ -1,6 +1,8 @@
 //! A filter with all that stands around it, in single precision, as a microcontroller runs it.
 
-use ohmstrain_ekf::live::{DoubtParts, FARTHEST_REST, Learned, LiveFilter, LiveParts, RestBounds, Sieve, Unread};
+use ohmstrain_ekf::live::{
+    DoubtParts, FARTHEST_REST, Learned, LiveFilter, LiveParts, RestBounds, Sieve, StaticCurve, Unread,
+};
 use ohmstrain_ekf::{Compact, Evidence, Gaussian, SignSplit, SparseEkf, StepError};
 use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, SensorLaw, StrainRange, SwitchedModel};
 
@@ -102,4 +104,43 @@ fn any_pause_is_passed() {
     for (dt_s, error) in [(f32::INFINITY, StepError::NonFiniteTimeStep), (-1.0, StepError::NegativeTimeStep)] {
         assert_eq!(filter().step_after(dt_s, None), Err(error));
     }
+}
+
+/// A curve gives the strain of a reading. Where one is missing, or may be a spike, the filter's strain stands.
+#[test]
+fn a_curve_gives_the_strain_of_readings_that_are_no_spikes() {
+    let curve = StaticCurve {
+        centre: 0.3,
+        half_range: 0.3,
+        coefficients: [0.15, 0.16, -0.01, 0.005],
+        range: LIMITS,
+        variance: 1e-6,
+    };
+    let (mut plain, mut on_curve) = (filter(), filter().on_curve(Some(curve)));
+    let mut counts = [0, 0];
+    for k in 0..300_u16 {
+        let rho = 0.2 + 0.1 * (0.02 * f32::from(k)).sin();
+        let reading = match k {
+            200..210 => None,
+            250 => Some(REST_READING * (1.0 + rho + 0.3)),
+            _ => Some(REST_READING * (1.0 + rho)),
+        };
+        let step = |filter: &mut Filter| match reading {
+            Some(reading) => filter.step(reading).unwrap(),
+            None => filter.predict().unwrap(),
+        };
+        let (without, with) = (step(&mut plain), step(&mut on_curve));
+        assert_eq!(without.rate, with.rate, "{k}");
+        let z = (rho - 0.3) / 0.3;
+        let expected = 0.15 + 0.16 * z - 0.01 * z * z + 0.005 * z * z * z;
+        if (200..210).contains(&k) || k == 250 {
+            counts[0] += 1;
+            assert_eq!(without.strain.mean, with.strain.mean, "{k}");
+        } else {
+            counts[1] += 1;
+            // Rounding of the reading, relative to R₀, and of four terms.
+            assert!((with.strain.mean - expected).abs() < 1e-6, "{k}: {} {expected}", with.strain.mean);
+        }
+    }
+    assert_eq!(counts, [11, 289]);
 }

@@ -195,6 +195,9 @@ pub fn first_fitting(params: &SensorParams, budget: &Budget, dt_s: f64) -> Resul
 
 /// Returns the plans of a sensor's default filter, the best first.
 fn plans(params: &SensorParams) -> Vec<Plan> {
+    if params.default_estimator == EstimatorKind::StaticCubic {
+        return vec![Plan::default()];
+    }
     let kind = params.filter_of(params.default_estimator);
     let is_corrected = params.default_estimator == EstimatorKind::Corrected;
     let of = |(hypotheses, left): (usize, Left)| {

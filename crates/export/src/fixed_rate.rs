@@ -60,7 +60,7 @@ impl<'a, const B: usize, const N: usize> FixedRate<'a, B, N> {
         let phases = phases.filter(|_| filter.kind != EstimatorKind::Ekf);
         let live = LiveParts { dt_s: f64::from(dt_s), ..filter.parts };
         let (correction, quadratics) = (filter.correction.as_ref(), quadratics.as_ref());
-        let mut parts = Parts { kind: filter.kind, phases, live, correction, quadratics };
+        let mut parts = Parts { kind: filter.kind, phases, live, curve: filter.curve, correction, quadratics };
         let longest_s = longest_step_s::<B, N, L>(&reference, &parts)? * STEP_GRACE;
         let usual_s = f64::from(dt_s) / (f64::from(dt_s) / longest_s).ceil().max(1.0);
         let kernel = |step_s| SparseEkf::<f64, Compact, B, N>::new(reference, step_s).map_err(parameter);

@@ -77,8 +77,13 @@ pub struct SourceFile {
 }
 
 /// The estimators that have an exported form.
-pub const FILTERS: [EstimatorKind; 4] =
-    [EstimatorKind::Corrected, EstimatorKind::SignSplit, EstimatorKind::Hypotheses, EstimatorKind::Ekf];
+pub const FILTERS: [EstimatorKind; 5] = [
+    EstimatorKind::Corrected,
+    EstimatorKind::SignSplit,
+    EstimatorKind::Hypotheses,
+    EstimatorKind::Ekf,
+    EstimatorKind::StaticCubic,
+];
 
 /// Reason why there is no source code.
 #[derive(Debug, thiserror::Error)]

@@ -53,6 +53,9 @@ impl ChipFilter {
     /// Describes the plan.
     pub fn words(&self) -> String {
         let name = self.filter.kind.name();
+        if self.filter.curve.is_some() {
+            return format!("static cubic, beside {name}");
+        }
         let filter = match self.filter.hypotheses {
             _ if self.filter.kind == EstimatorKind::Ekf => name.to_owned(),
             1 => format!("{name}, one hypothesis"),

@@ -188,7 +188,7 @@ impl<'a> Calibration<'a> {
         if recordings.iter().any(|other| (other.quantity, other.reading) != (quantity, reading)) {
             return Err(Error::OtherQuantity);
         }
-        let estimator = self.estimator.unwrap_or(RECIPE.estimator);
+        let estimators = self.estimator.as_ref().map_or(RECIPE.estimators, std::slice::from_ref);
         let mut samples: Vec<Samples> = recordings.iter().map(|recording| recording.samples).collect();
         let temperature = self.effect_of_temperature(recordings, &samples)?;
         if let Some(fit) = &temperature {
@@ -201,7 +201,7 @@ impl<'a> Calibration<'a> {
             return Err(Error::OtherMake { of_make, found: quantity });
         }
         let mut calibration =
-            ohmstrain_calib::calibrate(&samples, &self.structures(estimator), &[estimator], prior, progress)?;
+            ohmstrain_calib::calibrate(&samples, &self.structures(estimators), estimators, prior, progress)?;
         let (distrusted, left_out) = (mem::take(&mut calibration.distrusted), mem::take(&mut calibration.left_out));
         let rest_readings = mem::take(&mut calibration.rest_readings);
         let info = |(recording, rest_reading): (&Recording, &f64)| {
@@ -235,7 +235,8 @@ impl<'a> Calibration<'a> {
     }
 
     /// Returns the candidate structures of the law.
-    fn structures(self, estimator: EstimatorKind) -> Vec<LawOptions> {
+    fn structures(self, estimators: &[EstimatorKind]) -> Vec<LawOptions> {
+        let estimator = estimators.first().copied().unwrap_or(EstimatorKind::Corrected);
         let with_gauge = |options: &LawOptions| LawOptions { gauge: self.gauge.unwrap_or(options.gauge), ..*options };
         let structures: Vec<LawOptions> = LawOptions::candidates(estimator).iter().map(with_gauge).collect();
         match self.branches {

@@ -117,7 +117,7 @@ impl FilterBuilder<'_> {
         mut take: impl FnMut(Range<usize>, &[Estimate]) -> Result<(), E>,
     ) -> Result<(), E> {
         let starts_known = self.initial_strain.is_some();
-        let kind = self.kind();
+        let kind = self.sensor.params().smoother_of(self.kind());
         let mut smoother = self.sensor.build_smoother(kind, &self.options()?)?;
         let (scale, mut doubts) = (self.scale()?, self.smoothers_doubts(kind)?);
         let failed = |(row, source): (usize, StepError)| Error::Row { row, source };

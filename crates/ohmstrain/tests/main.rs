@@ -10,6 +10,7 @@ mod lag;
 mod motion_doubts;
 mod resumed;
 mod rows;
+mod static_curve;
 mod surprises;
 mod threads;
 #[cfg(feature = "trace")]

@@ -108,7 +108,9 @@ impl Reporting<'_> {
         let params = self.sensor.params();
         let left_out = params.summary.as_ref().filter(|_| self.sample != Sample::Out).map(verdict::Known::from);
         let known = [verdict::Known::new(filter, cubic)].into_iter().chain(left_out);
-        verdict::verdict(&known.chain(self.tested.map(verdict::Known::from)).collect::<Vec<_>>())
+        let known: Vec<_> = known.chain(self.tested.map(verdict::Known::from)).collect();
+        let kind = self.kind.unwrap_or(params.default_estimator);
+        if kind == EstimatorKind::StaticCubic { verdict::of_static_curve(&known) } else { verdict::verdict(&known) }
     }
 }
 

@@ -58,6 +58,7 @@ fn sensor() -> SensorParams {
             reading_centre: 1200.0,
             reading_scale: 200.0,
             coefficients: [0.15, 0.1, 0.0, 0.05],
+            error_sd: None,
             range,
         },
         joint: None,

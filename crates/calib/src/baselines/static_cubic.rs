@@ -7,7 +7,7 @@ use crate::CalibrationError;
 use crate::samples::Samples;
 use ohmstrain_sensor::StaticCubic;
 
-/// Fits by least squares over all rows with reading and strain.
+/// Fits by least squares over all rows with reading and strain. The error is that of these rows, for as many degrees of freedom.
 ///
 /// # Errors
 /// If the readings do not vary.
@@ -22,7 +22,10 @@ pub fn fit_static_cubic(recordings: &[Samples], range: StrainRange<f64>) -> Resu
     let strain = DVector::from_iterator(rows.len(), rows.iter().map(|(_, strain)| *strain));
     let solution = design.svd(true, true).solve(&strain, 1e-12).map_err(|_| CalibrationError::Singular)?;
     let coefficients = [solution[0], solution[1], solution[2], solution[3]];
-    Ok(StaticCubic { reading_centre, reading_scale, coefficients, range })
+    let cubic = StaticCubic { reading_centre, reading_scale, coefficients, range, error_sd: None };
+    let squares: f64 = rows.iter().map(|(reading, strain)| (cubic.strain(*reading) - strain).powi(2)).sum();
+    let freedom = rows.len().saturating_sub(coefficients.len()).max(1);
+    Ok(StaticCubic { error_sd: Some((squares / freedom as f64).sqrt()), ..cubic })
 }
 
 /// Returns the static cubic as a baseline that runs row by row.

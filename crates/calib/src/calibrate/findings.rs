@@ -9,6 +9,7 @@ use crate::baselines::{Baseline, fit_static_cubic, running_cubic};
 use crate::calibrate::correction_fit::fit_correction;
 use crate::calibrate::error_budget::{Direction, WrongDirection, error_budget};
 use crate::calibrate::left_out::relative_changes;
+use crate::calibrate::median_rest;
 use crate::calibrate::scores::{ScoredRow, score_of_full_scale};
 use crate::calibrate::unstated::{error_factor, unstated};
 use crate::law::fit::CrossFit;
@@ -128,6 +129,27 @@ pub(crate) struct Checked {
     pub rows: Vec<LeftOutRow>,
 }
 
+impl Checked {
+    /// True if the error of its filter is smaller than another's.
+    pub(crate) fn filters_better_than(&self, other: &Self) -> bool {
+        self.findings.filter.rmse < other.findings.filter.rmse
+    }
+
+    /// True if the error of its smoother is smaller than another's.
+    pub(crate) fn smooths_better_than(&self, other: &Self) -> bool {
+        let error = |checked: &Self| checked.findings.smoother.as_ref().map_or(f64::INFINITY, |smoother| smoother.rmse);
+        error(self) < error(other)
+    }
+
+    /// Returns it with the smoother of another check of the same rows.
+    pub(crate) fn smoothed_as(self, other: &Self) -> Self {
+        let findings = Findings { smoother: other.findings.smoother, ..self.findings };
+        let unstated = Unstated { smoother_sd: other.unstated.smoother_sd, ..self.unstated };
+        let smoothed = |(row, other): (LeftOutRow, &LeftOutRow)| LeftOutRow { smoothed: other.smoothed, ..row };
+        Self { findings, unstated, rows: self.rows.into_iter().zip(&other.rows).map(smoothed).collect() }
+    }
+}
+
 /// Returns the unstated errors of the estimators in these quarters, with errors multiplied by `factor`.
 fn unstated_in<'b>(blocks: impl Iterator<Item = &'b Scored>, factor: f64) -> Unstated {
     let (mut filter, mut smoother) = (Vec::new(), Vec::new());
@@ -185,6 +207,8 @@ impl Check<'_> {
             .collect();
         let cubic = fit_static_cubic(&training, limits)?;
         let (estimator, learned) = self.estimator_without(law, &training)?;
+        let curve = cubic.curve(median_rest(&law.rest_readings)).filter(|_| self.kind == EstimatorKind::StaticCubic);
+        let estimator = estimator.on_curve(curve);
         let mut scored = Scored::default();
         for (r, samples) in self.recordings.iter().enumerate() {
             let rows = self.fit.blocks[r][block].clone();

@@ -1,6 +1,7 @@
 //! Calibration of a sensor from recordings with known strain: the law, noise and motion of its filters, the correction, and their
 //! quality on held-out quarters.
 
+pub(crate) mod best;
 pub(crate) mod correction_fit;
 pub(crate) mod correction_scale;
 pub(crate) mod error_budget;
@@ -19,6 +20,7 @@ use std::collections::BTreeMap;
 
 use crate::CalibrationError;
 use crate::baselines::fit_static_cubic;
+use crate::calibrate::best::{Best, StaticCubicAs};
 use crate::calibrate::correction_fit::fit_correction;
 use crate::calibrate::findings::{Check, Checked, LeftOutRow, seen};
 use crate::calibrate::noise_fit::{FURTHER, NoiseProblem, REFINEMENT, SURVEY, Surveyed, survey, survey_evaluations};
@@ -152,22 +154,21 @@ fn calibrate_arranged(
     let of_make = prior.and_then(|prior| prior.correction.as_ref());
     let correction =
         corrected.map(|kind| correction(recordings, fit, (kind, of_make), &estimators)).transpose()?.flatten();
-    let (default_estimator, filter) =
-        correction.as_ref().map_or((best, best), |correction| (EstimatorKind::Corrected, correction.corrects));
+    let whole = correction.as_ref().map_or((best, best), |correction| (EstimatorKind::Corrected, correction.corrects));
     let limits = fit.law.law.range;
     (steps.progress)(Stage::LeftOut);
     let identifiability = identifiability(recordings, &fit.law.law).ok();
     let seen = seen(recordings, limits, &stats);
-    let checked = Check {
-        recordings,
-        strokes: stats.strokes,
-        fit,
-        kind: default_estimator,
-        filter,
-        estimators: &estimators,
-        of_make,
+    let check = |(kind, filter)| {
+        let strokes = stats.strokes;
+        Check { recordings, strokes, fit, kind, filter, estimators: &estimators, of_make }
+            .checked(seen, &identifiability)
+    };
+    let Best { default: default_estimator, smoother, checked } = Best::on_held_out(whole, asked.static_cubic, check);
+    let correction = correction.filter(|_| smoother == EstimatorKind::Corrected);
+    if default_estimator == EstimatorKind::StaticCubic && correction.is_none() {
+        estimators.retain(|kind, _| *kind == EstimatorKind::Ekf || asked.named.contains(kind));
     }
-    .checked(seen, &identifiability);
     let (unstated, findings, left_out) = checked.map_or_else(Default::default, |checked| {
         let Checked { findings, unstated, rows } = checked;
         (unstated, Some(findings), rows)
@@ -208,6 +209,8 @@ struct Asked<'a> {
     named: Vec<EstimatorKind>,
     /// Candidates for the correction: the best of them is corrected.
     candidates: &'a [EstimatorKind],
+    /// Role of the static cubic.
+    static_cubic: StaticCubicAs,
 }
 
 impl<'a> Asked<'a> {
@@ -217,7 +220,13 @@ impl<'a> Asked<'a> {
             Some(of_make) => std::slice::from_ref(&of_make.corrects),
             None => RECIPE.candidates(stats.hold_s.is_some()),
         };
-        Self { named: kinds.iter().copied().filter(|kind| *kind != EstimatorKind::Corrected).collect(), candidates }
+        let is_filter = |kind: &EstimatorKind| !matches!(kind, EstimatorKind::Corrected | EstimatorKind::StaticCubic);
+        let mut named: Vec<EstimatorKind> = kinds.iter().copied().filter(is_filter).collect();
+        let static_cubic = StaticCubicAs::of(kinds);
+        if static_cubic == StaticCubicAs::Default {
+            named.push(EstimatorKind::Ekf);
+        }
+        Self { named, candidates, static_cubic }
     }
 
     fn all(&self) -> Vec<EstimatorKind> {

@@ -15,7 +15,7 @@ const ALONE: f64 = 1.0 / 3.0;
 /// The pair with the best score on held-out blocks determines the law. Every estimator, and the extended Kalman filter in any case, is then
 /// fitted to that law; the one of `kinds` with the best score on every row of those blocks becomes the default. Near ties go to the one that
 /// keeps hypotheses. [`EstimatorKind::Corrected`] is the default if it is requested; it corrects the best of its candidates, and is learned
-/// last, from the same rows.
+/// last, from the same rows. If [`EstimatorKind::StaticCubic`] is requested as well, the better of the two on held-out quarters is the default.
 ///
 /// A prior is for one more sensor of a known make. It determines the law's structure; `structures` applies only without one. Noise and
 /// motion start from the prior, and the filter that the others correct is the only candidate for a correction.

@@ -26,8 +26,9 @@ pub struct CalibrateArgs {
     /// Family of the gauge curve: auto (polynomial), polynomial, decaying-exponential or tunnelling
     #[arg(long, default_value = "auto")]
     pub gauge: Auto<GaugeFamily>,
-    /// Estimator to calibrate and to make the default: auto (corrected: sign-split and what is learned about its error), corrected, ekf, ukf, imm, sign-split
-    /// or hypotheses; ekf is calibrated in any case
+    /// Estimator to calibrate and to make the default: auto (corrected, or static-cubic if that is better on held-out quarters), corrected
+    /// (sign-split and what is learned about its error), ekf, ukf, imm, sign-split, hypotheses or static-cubic; ekf is calibrated in any
+    /// case
     #[arg(long, default_value = "auto")]
     pub estimator: Auto<EstimatorKind>,
     /// Prior learned from other sensors of the make (`fleet fit`): a short motion is enough then

@@ -12,8 +12,8 @@ pub struct EstimateArgs {
     /// The sensor's parameters; for smooth and live also a hand.toml
     #[arg(long, value_name = "sensor.toml")]
     pub sensor: PathBuf,
-    /// Estimator: auto (the sensor file's choice), corrected, ekf, ukf, imm, sign-split or
-    /// hypotheses
+    /// Estimator: auto (the sensor file's choice), corrected, ekf, ukf, imm, sign-split, hypotheses
+    /// or static-cubic
     #[arg(long, default_value = "auto")]
     pub estimator: Auto<EstimatorKind>,
     /// Strain (or angle) at the first row, if it is known; the body is at rest there

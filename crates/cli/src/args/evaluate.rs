@@ -19,7 +19,7 @@ pub struct EvaluateArgs {
     #[arg(long, value_name = "TRACE", requires = "train", conflicts_with_all = ["sensor", "split"])]
     pub test: Vec<PathBuf>,
     /// Estimator: auto (the sensor file's choice, or the one that calibrate would choose), corrected, ekf, ukf, imm,
-    /// sign-split, hypotheses, or all
+    /// sign-split, hypotheses, static-cubic, or all
     #[arg(long, default_value = "auto")]
     pub estimator: Estimators,
     /// Do without the learned correction of the strain. Without this flag, calibrations are scored with and without it

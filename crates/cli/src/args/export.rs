@@ -42,7 +42,7 @@ pub struct ExportArgs {
     /// Usual time between two readings on the microcontroller, s [default: that of the calibration's recordings]
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
     pub dt_s: Option<f64>,
-    /// Estimator to export: auto (the sensor's default), corrected, sign-split, hypotheses or ekf
+    /// Estimator to export: auto (the sensor's default), corrected, sign-split, hypotheses, ekf or static-cubic
     #[arg(long, default_value = "auto")]
     pub estimator: Auto<EstimatorKind>,
     #[arg(long, value_name = "BUDGET", conflicts_with = "estimator", help = budget_help())]

@@ -15,7 +15,7 @@ use ohmstrain_export::{self as export, Compared, ExportError, Promise, SourceFil
 pub fn run(args: &ExportArgs) -> Result<(), CliError> {
     let asked = args.estimator.chosen();
     if let Some(other) = asked.filter(|kind| !export::FILTERS.contains(kind)) {
-        let message = "--estimator: expected corrected, sign-split, hypotheses or ekf, found";
+        let message = "--estimator: expected corrected, sign-split, hypotheses, ekf or static-cubic, found";
         return Err(CliError::Arguments(format!("{message} {}", other.name())));
     }
     let sensor = sensor_file::read(&args.sensor, asked)?;

@@ -2,7 +2,7 @@ use ohmstrain_model::{MOTION_STATES, StrainRange};
 
 use super::{
     BESIDE_SHARE, Correct, DOUBT, Doubts, FARTHEST_REST, Flags, Jumps, LiveParts, Protections, Repeats, RestFollower,
-    SURPRISING_NIS, SensorEstimator, Sieve,
+    SURPRISING_NIS, SensorEstimator, Sieve, StaticCurve,
 };
 use crate::clock::check_time_step;
 use crate::correction::{ReadingFeatures, filter_inputs};
@@ -85,6 +85,9 @@ pub struct Measured<T> {
     /// Jump of the readings, if it caused a second look: at the second reading in a row beyond five standard
     /// deviations, and farther than [`Sieve::jump`] from the last one that did not surprise.
     pub jumped: Option<T>,
+    /// True for the first few startling readings in a row, which may be spikes ([`Jumps::may_be_spike`]).
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub spike: bool,
     /// Factor on the covariance of the state before the step, at a readmission ([`Guard`]).
     inflation: T,
 }
@@ -94,12 +97,17 @@ impl<T: Real> Measured<T> {
     #[must_use]
     pub fn nothing() -> Self {
         let verdict = ReadingVerdict::Missing;
-        Self { verdict, reading: None, used: None, nis: None, jumped: None, inflation: T::one() }
+        Self { verdict, reading: None, used: None, nis: None, jumped: None, spike: false, inflation: T::one() }
     }
 
     /// True for a reading that was downweighted because it was far from its expectation.
     pub fn surprises(&self) -> bool {
         self.verdict == ReadingVerdict::Downweighted && self.nis.is_none_or(|nis| nis > T::of(SURPRISING_NIS))
+    }
+
+    /// Returns the strain of the reading on a curve; `None` if it was not used, or may be a spike.
+    pub fn on_curve(&self, curve: &StaticCurve<T>) -> Option<Gaussian<T>> {
+        self.used.filter(|_| !self.spike).map(|used| curve.strain(used.value))
     }
 }
 
@@ -111,6 +119,8 @@ pub struct LiveFilter<T: Real, E: SensorEstimator<T, N, L>, C, const N: usize, c
     estimator: Substeps<E>,
     guard: Guard<T>,
     parts: LiveParts<T, C>,
+    /// Curve that gives the strain in place of the estimator.
+    curve: Option<StaticCurve<T>>,
     protections: Protections,
     /// Plausibility limits on a reading, under these protections.
     sieve: Sieve<T>,
@@ -176,8 +186,15 @@ where
             sieve: parts.sieve,
             estimator,
             parts,
+            curve: None,
             fresh,
         }
+    }
+
+    /// Sets a curve that gives the strain of a row with a reading, unless that may be a spike, in place of the estimator.
+    #[must_use]
+    pub fn on_curve(self, curve: Option<StaticCurve<T>>) -> Self {
+        Self { curve, ..self }
     }
 
     /// Turns off some protections, before any reading.
@@ -329,7 +346,9 @@ where
         let moments = look.as_ref().unwrap_or(&self.now.state).moments();
         let filtered = self.filtered(&moments);
         self.watch(dt_s, &measured, filtered);
-        let stated = self.corrected(look.as_ref().unwrap_or(&self.now.state), &moments, filtered);
+        let on_curve = self.curve.and_then(|curve| measured.on_curve(&curve));
+        let corrected = || self.corrected(look.as_ref().unwrap_or(&self.now.state), &moments, filtered);
+        let stated = on_curve.unwrap_or_else(corrected);
         let now = &mut self.now;
         let nis = measured.nis.unwrap_or(T::zero());
         let taken = reading.filter(|_| measured.used.is_some()).map(|reading| (reading.value, nis));
@@ -392,13 +411,14 @@ where
         let verdict = turned_down.unwrap_or(guarded.verdict);
         let nis = guarded.advanced.innovation.map(|innovation| innovation.nis);
         let (used, inflation) = (guarded.used.filter(|_| verdict.is_taken()), guarded.inflation);
-        let mut measured = Measured { verdict, reading, used, nis, jumped: None, inflation };
+        let mut measured = Measured { verdict, reading, used, nis, jumped: None, spike: false, inflation };
         let jumped =
             seen.filter(|_| measured.used.is_some() && verdict != ReadingVerdict::Readmitted).and_then(|seen| {
                 let nis = nis.unwrap_or(T::zero());
                 now.jumps.see(seen.value, nis, self.sieve.jump)
             });
         measured.jumped = jumped.filter(|_| measured.surprises());
+        measured.spike = measured.used.is_some() && now.jumps.may_be_spike();
         (now.repeats, now.streak) = (repeats, guarded.streak);
         let look = if measured.used.is_some() {
             (now.state, now.pause) = (guarded.advanced.state, at_reading(&self.estimator, &self.parts));

@@ -6,6 +6,8 @@ pub const SURPRISING_NIS: f64 = 9.0;
 const STARTLING_NIS: f64 = 25.0;
 /// Number of startling readings in a row that triggers a second look.
 const BESIDE_AFTER: f64 = 2.0;
+/// Largest number of startling readings in a row that may be a spike.
+const LONGEST_SPIKE: f64 = 3.0;
 /// Weight that the initial distribution then gets.
 pub const BESIDE_SHARE: f64 = 0.1;
 
@@ -34,6 +36,12 @@ impl<T: Recordable> Jumps<T> {
         let from_calm = self.calm.map(|calm| reading - calm);
         self.calm = if nis > T::of(SURPRISING_NIS) { self.calm } else { Some(reading) };
         from_calm.filter(|moved| self.startling == T::of(BESIDE_AFTER) && moved.abs() > jump)
+    }
+
+    /// True if the last reading startled, and at most two before it in a row: a wrong law startles for longer than a spike.
+    #[must_use]
+    pub fn may_be_spike(&self) -> bool {
+        self.startling > T::zero() && self.startling <= T::of(LONGEST_SPIKE)
     }
 }
 

@@ -14,6 +14,7 @@ mod protections;
 mod rest_follow;
 mod rest_watch;
 mod sieve;
+mod static_curve;
 mod turn_watch;
 mod unread;
 
@@ -29,5 +30,6 @@ pub use protections::Protections;
 pub use rest_follow::{FARTHEST_REST, RestBounds, RestFollower, SessionStart};
 pub use rest_watch::{RestSeen, RestWatch};
 pub use sieve::{MOST_CODE_REPEATS, MOST_REPEATS, Repeats, Sieve, news};
+pub use static_curve::StaticCurve;
 pub use turn_watch::{TurnSeen, TurnWatch};
 pub use unread::{NEVER_READ_S, Unread};

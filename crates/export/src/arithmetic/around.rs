@@ -2,7 +2,9 @@
 //! code runs on expressions, once for every path through it.
 
 use ohmstrain_ekf::correction::{Decay, FeatureScale, ReadingFeatures, TIME_CONSTANTS_S};
-use ohmstrain_ekf::live::{Doubts, Flag, Jumps, LiveParts, Repeats, RestFollower, SURPRISING_NIS, Sieve, reported};
+use ohmstrain_ekf::live::{
+    Doubts, Flag, Jumps, LiveParts, Repeats, RestFollower, SURPRISING_NIS, Sieve, StaticCurve, reported,
+};
 use ohmstrain_ekf::record::{Expression, Fields, See, Writer};
 use ohmstrain_ekf::{Gaussian, Influence, Reading, ReadingVerdict};
 use ohmstrain_model::Number;
@@ -30,6 +32,9 @@ impl Around<'_> {
             of_readings.into_iter().chain(of_rest).chain(of_doubts).chain([self.has_begun(), self.refuse()]).collect();
         if self.parts.live.doubt.turns.is_some() {
             all.push(self.watch_turns());
+        }
+        if let Some(curve) = &self.parts.curve {
+            all.extend([may_be_spike(), on_curve(curve)]);
         }
         if let Some(correction) = self.parts.correction {
             all.extend([self.birge(), watch(&correction.features)]);
@@ -342,6 +347,33 @@ fn startles() -> Printed {
             writer.keep(jumps);
             writer.give("jump", jump.unwrap_or(number(0.0)));
             writer.tell(RETURNED, jump.is_some());
+        },
+    )
+}
+
+/// Records whether the last reading may be a spike.
+fn may_be_spike() -> Printed {
+    Printed::new(
+        "may_be_spike",
+        "Whether the last reading startled, and at most two before it in a row.",
+        &[],
+        |writer| {
+            let jumps = writer.state(Jumps::none());
+            writer.tell(RETURNED, jumps.may_be_spike());
+        },
+    )
+}
+
+/// Records the strain of a reading on a curve.
+fn on_curve(curve: &StaticCurve<f64>) -> Printed {
+    Printed::new(
+        "on_curve",
+        "The strain of a reading, relative, by the static cubic, and its variance.",
+        &["float rho"],
+        |writer| {
+            let Gaussian { mean, variance } = curve.to().strain(writer.input("rho"));
+            writer.give("curve_variance", variance);
+            writer.give(RETURNED, mean);
         },
     )
 }

@@ -4,7 +4,7 @@ mod kernel;
 mod readings;
 
 use ohmstrain_ekf::Belief;
-use ohmstrain_ekf::live::{BESIDE_SHARE, DOUBT, FARTHEST_REST, KNOWN_BEYOND, LiveParts};
+use ohmstrain_ekf::live::{BESIDE_SHARE, DOUBT, FARTHEST_REST, KNOWN_BEYOND, LiveParts, StaticCurve};
 use ohmstrain_sensor::{EstimatorKind, PortableFilter, Quantity, ReadingUnit, SensorParams, with_sizes};
 use serde::Serialize;
 
@@ -73,6 +73,8 @@ pub struct Exported {
     /// `None` if the direction is never left open.
     forgets_s: Option<Literal>,
     limits: SharedConstants,
+    /// Static cubic; `None` if the filter gives the strain.
+    curve: Option<CurveConstants>,
     correction: Option<CorrectionConstants>,
     /// The kernel as functions in C, and the functions around it.
     arithmetic: String,
@@ -106,6 +108,30 @@ struct ListConstants {
 impl ListConstants {
     fn new(lists: &Lists) -> Self {
         Self { registers: lists.registers(), names: lists.names(), cases: lists.cases() }
+    }
+}
+
+/// Numbers of the static cubic.
+#[derive(Debug, Serialize)]
+struct CurveConstants {
+    centre: Literal,
+    half_range: Literal,
+    coefficients: [Literal; 4],
+    lower: Literal,
+    upper: Literal,
+    variance: Literal,
+}
+
+impl CurveConstants {
+    fn new(curve: &StaticCurve<f32>) -> Self {
+        Self {
+            centre: Literal(curve.centre),
+            half_range: Literal(curve.half_range),
+            coefficients: curve.coefficients.map(Literal),
+            lower: Literal(curve.range.lower),
+            upper: Literal(curve.range.upper),
+            variance: Literal(curve.variance),
+        }
     }
 }
 
@@ -205,6 +231,7 @@ impl Exported {
             tempering: (numbers.tempering != 1.0).then_some(Literal(-0.5 * numbers.tempering)),
             forgets_s: finite(numbers.forgets_direction_s),
             limits: SharedConstants::new(),
+            curve: sensor.parts.curve.map(|curve| CurveConstants::new(&curve.to())),
             correction: filter
                 .correction
                 .as_ref()
@@ -251,6 +278,11 @@ impl EstimatorText {
                 "SignSplit",
             ),
             EstimatorKind::Hypotheses => ("Filter of phase histories", "filter of phase histories", "Hypotheses"),
+            _ if filter.curve.is_some() => (
+                "Static cubic of the reading, beside an extended Kalman filter",
+                "static cubic of the reading, beside an extended Kalman filter",
+                "SparseEkf",
+            ),
             _ => ("Extended Kalman filter", "extended Kalman filter", "SparseEkf"),
         };
         let hypotheses = if filter.kind == EstimatorKind::Ekf { 0 } else { filter.hypotheses };
@@ -258,7 +290,11 @@ impl EstimatorText {
             0 => format!("{name}<f32, Compact, {branches}, {states}>"),
             _ => format!("{name}<f32, {branches}, {states}, {hypotheses}, Compact>"),
         };
-        let estimator = if filter.correction.is_some() { EstimatorKind::Corrected } else { filter.kind };
+        let estimator = match (&filter.correction, &filter.curve) {
+            (Some(_), _) => EstimatorKind::Corrected,
+            (None, Some(_)) => EstimatorKind::StaticCubic,
+            (None, None) => filter.kind,
+        };
         Self { title, prose, name: estimator.name(), rust, hypotheses }
     }
 }

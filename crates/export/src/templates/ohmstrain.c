@@ -626,6 +626,11 @@ static ohmstrain_status step(ohmstrain_state *state, float dt_s, const float *rh
         summarise(state, &all);
     }
     strain = reported(all.mean[0], all.variance[0], &variance);
+{% if curve %}
+    if (rho && !may_be_spike(&seen)) {
+        strain = on_curve(*rho, &variance);
+    }
+{% endif %}
 {% if correction %}
     hear(&seen, dt_s, rho, surprises);
     seen.known_variance = seen.waits ? seen.known_variance : variance;

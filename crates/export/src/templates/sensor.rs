@@ -7,10 +7,8 @@
 
 {% if correction %}
 use ohmstrain_ekf::correction::{Correction, FILTER_INPUTS, FeatureScale, InputScale, Process{% if correction.quadratics %}, Quadratic{% endif %}, RowBlock, InputRows{% if correction.simulated %}, Simulated{% endif %}, Triangle};
-use ohmstrain_ekf::live::{DoubtParts, Learned, LiveFilter, LiveParts, RestBounds, {% if doubt.rest %}RestSeen, {% endif %}{% if follow.start is not none %}SessionStart, {% endif %}Sieve, {% if doubt.turns %}TurnSeen, {% endif %}Unread};
-{% else %}
-use ohmstrain_ekf::live::{DoubtParts, Learned, LiveFilter, LiveParts, RestBounds, {% if doubt.rest %}RestSeen, {% endif %}{% if follow.start is not none %}SessionStart, {% endif %}Sieve, {% if doubt.turns %}TurnSeen, {% endif %}Unread};
 {% endif %}
+use ohmstrain_ekf::live::{DoubtParts, Learned, LiveFilter, LiveParts, RestBounds, {% if doubt.rest %}RestSeen, {% endif %}{% if follow.start is not none %}SessionStart, {% endif %}Sieve, {% if curve %}StaticCurve, {% endif %}{% if doubt.turns %}TurnSeen, {% endif %}Unread};
 {% if splits %}
 use ohmstrain_ekf::{Compact, {% if rests %}Dwell, {% endif %}Evidence, SignSplit, SparseEkf, StepError};
 {% elif estimator.hypotheses %}
@@ -218,9 +216,20 @@ pub fn filter() -> Result<Filter, StepError> {
     Ok(LiveFilter::new(Estimator::around(kernel, dwell, evidence), PARTS))
 {% endif %}
 {% else %}
-    Ok(LiveFilter::new(kernel, PARTS))
+    Ok(LiveFilter::new(kernel, PARTS)<< ".on_curve(Some(CURVE))" if curve else "" >>)
 {% endif %}
 }
+{% if curve %}
+
+/// Strain of a reading, in place of the filter's.
+pub const CURVE: StaticCurve<f32> = StaticCurve {
+    centre: << curve.centre >>,
+    half_range: << curve.half_range >>,
+    coefficients: [<< curve.coefficients|join(", ") >>],
+    range: StrainRange { lower: << curve.lower >>, upper: << curve.upper >> },
+    variance: << curve.variance >>,
+};
+{% endif %}
 {% if correction %}
 
 /// The scale on which the correction sees readings.

@@ -174,8 +174,9 @@ impl<T: Real, J: Task<T>, const B: usize, const S: usize> Of<'_, '_, T, J, B, S>
         let learned =
             parts.correction.map(|correction| OwnedLearned::new(correction, parts.quadratics, parts.limits_in()));
         let twin = Twin { filter, hypotheses: sensor.hypotheses, numbers, work: [const { Cell::new(0) }; 2] };
+        let curve = parts.curve.map(|curve| curve.to());
         let parts = parts.live.to().with_correction(learned.as_ref().map(OwnedLearned::learned));
-        task.run(LiveFilter::new(twin, parts))
+        task.run(LiveFilter::new(twin, parts).on_curve(curve))
     }
 }
 

@@ -1,6 +1,6 @@
 //! Parts of an exported program.
 
-use ohmstrain_ekf::live::{Flag, Flags, LiveParts};
+use ohmstrain_ekf::live::{Flag, Flags, LiveParts, StaticCurve};
 use ohmstrain_ekf::{Dwell, Evidence, Real, StepError};
 use ohmstrain_model::StrainRange;
 use ohmstrain_sensor::{EstimatorKind, PhaseParams, PortableCorrection};
@@ -34,6 +34,8 @@ pub struct Parts<'a> {
     pub phases: Option<PhaseParams>,
     /// Surroundings of the filter. Lengths of steps are those of single precision.
     pub live: LiveParts<f64, ()>,
+    /// Curve that gives the strain in place of the filter.
+    pub curve: Option<StaticCurve<f64>>,
     pub correction: Option<&'a PortableCorrection>,
     /// Stand-in for rows of the correction that were left out.
     pub quadratics: Option<&'a [OwnedQuadratic; 2]>,

@@ -6,7 +6,7 @@ use ohmstrain_sensor::{
 use serde::Serialize;
 
 use super::number::{fixed, shown, significant};
-use super::verdict::{Known, is_better, percent, verdict};
+use super::verdict::{Known, is_better, of_static_curve, percent, verdict};
 
 /// Number of pieces of advice that are printed; the others are only counted.
 const PRINTED_ADVICE: usize = 1;
@@ -84,7 +84,8 @@ impl Closing<'_> {
     #[must_use]
     pub fn verdict(&self) -> Option<String> {
         let known = self.known();
-        (!known.is_empty()).then(|| verdict(&known))
+        let of = if self.params.default_estimator == EstimatorKind::StaticCubic { of_static_curve } else { verdict };
+        (!known.is_empty()).then(|| of(&known))
     }
 
     /// True if all its known errors are below 0.9 times the static cubic's; `None` if none are known.
@@ -110,7 +111,9 @@ impl Closing<'_> {
     /// ```
     #[must_use]
     pub fn warning(&self, chosen: Option<EstimatorKind>) -> Option<String> {
-        let chosen = chosen.filter(|chosen| *chosen != EstimatorKind::Corrected && self.is_better() == Some(false))?;
+        let is_one_of_many =
+            |chosen: &EstimatorKind| !matches!(chosen, EstimatorKind::Corrected | EstimatorKind::StaticCubic);
+        let chosen = chosen.filter(|chosen| is_one_of_many(chosen) && self.is_better() == Some(false))?;
         let (file, name) = (self.file.unwrap_or("the sensor"), chosen.name());
         Some(format!(
             "{file}: {name} is no better than a static curve; without --estimator, calibrate tries others and a correction"
@@ -120,8 +123,8 @@ impl Closing<'_> {
     /// Describes by how much intervals are wider than the estimator's, to cover errors on held-out rows.
     fn widened(&self) -> Option<String> {
         let sd = self.params.unstated.filter_sd;
-        let share = percent(100.0 * sd / self.params.limits.span());
-        (sd > 0.0).then(|| format!("intervals are widened by a deviation of {share} for it"))
+        let share = 100.0 * sd / self.params.limits.span();
+        (share >= 0.05).then(|| format!("intervals are widened by a deviation of {} for it", percent(share)))
     }
 
     fn known(&self) -> Vec<Known> {

@@ -102,6 +102,15 @@ pub fn verdict(known: &[Known]) -> String {
     format!("{better}; {}.", of_intervals(known))
 }
 
+/// Returns the sentence for a sensor whose default estimator is the static curve, by the worst of the scores.
+///
+/// ```
+/// assert_eq!(ohmstrain::verdict::of_static_curve(&[]), "A static curve is best here; its error bars hold.");
+/// ```
+pub fn of_static_curve(known: &[Known]) -> String {
+    format!("A static curve is best here; {}.", of_intervals(known))
+}
+
 fn of_intervals(known: &[Known]) -> &'static str {
     match (known.iter().any(|part| part.covered < COVERED), known.iter().any(|part| part.width > WIDE)) {
         (true, _) => "its error bars are too narrow",

@@ -216,7 +216,8 @@ class Sensor:
             Path of a state file, from which a live filter of the same sensor and options resumes; written by its ``save``, or by
             ``ohmstrain filter --save-state``. R₀ and known strains come from the state; known strains given here are added.
         estimator : str
-            ``auto`` (the sensor's choice), ``corrected``, ``ekf``, ``ukf``, ``imm``, ``sign-split``, ``hypotheses``.
+            ``auto`` (the sensor's choice), ``corrected``, ``ekf``, ``ukf``, ``imm``, ``sign-split``, ``hypotheses``,
+            ``static-cubic``.
         correction : bool
             Apply the learned correction of the strain; true by default.
         initial_strain : float

@@ -22,6 +22,8 @@ pub enum EstimatorKind {
     Hypotheses,
     /// A filter with the learned correction of its strain.
     Corrected,
+    /// Strain as a cubic of the reading, with the extended Kalman filter's rate and protections.
+    StaticCubic,
 }
 
 /// Error of a sensor file without parameters for an estimator.
@@ -34,7 +36,8 @@ pub struct NoParameters {
 
 impl EstimatorKind {
     /// All estimators.
-    pub const ALL: [Self; 6] = [Self::Ekf, Self::Ukf, Self::Imm, Self::SignSplit, Self::Hypotheses, Self::Corrected];
+    pub const ALL: [Self; 7] =
+        [Self::Ekf, Self::Ukf, Self::Imm, Self::SignSplit, Self::Hypotheses, Self::Corrected, Self::StaticCubic];
 
     /// Returns each kind once, in order of first occurrence.
     #[must_use]
@@ -51,7 +54,7 @@ impl EstimatorKind {
     /// True if it keeps hypotheses about the phase; the others keep one Gaussian.
     #[must_use]
     pub const fn has_phases(self) -> bool {
-        !matches!(self, Self::Ekf | Self::Ukf)
+        !matches!(self, Self::Ekf | Self::Ukf | Self::StaticCubic)
     }
 
     /// Its name on the command line and in files.
@@ -64,6 +67,7 @@ impl EstimatorKind {
             Self::SignSplit => "sign-split",
             Self::Hypotheses => "hypotheses",
             Self::Corrected => "corrected",
+            Self::StaticCubic => "static-cubic",
         }
     }
 }

@@ -268,13 +268,21 @@ impl Uncertainty {
 }
 
 impl SensorParams {
-    /// Returns the filter behind an estimator: itself, or the one whose strain is corrected.
+    /// Returns the filter behind an estimator: itself, the one whose strain is corrected, or the one beside the static cubic.
     #[must_use]
     pub fn filter_of(&self, kind: EstimatorKind) -> EstimatorKind {
         match &self.correction {
             Some(correction) if kind == EstimatorKind::Corrected => correction.corrects,
+            _ if kind == EstimatorKind::StaticCubic => EstimatorKind::Ekf,
             _ => kind,
         }
+    }
+
+    /// Returns the estimator that smooths for an estimator: itself, but for the static cubic the corrected filter, if the sensor has one.
+    #[must_use]
+    pub fn smoother_of(&self, kind: EstimatorKind) -> EstimatorKind {
+        let has_better = kind == EstimatorKind::StaticCubic && self.correction.is_some();
+        if has_better { EstimatorKind::Corrected } else { kind }
     }
 
     /// Returns `filter`, `smoother` or both: those of the default estimator, or of the filter that it corrects, whose intervals
@@ -283,8 +291,10 @@ impl SensorParams {
     pub fn widened_most(&self) -> Vec<&'static str> {
         let of = |kind: EstimatorKind| self.estimators.get(&self.filter_of(kind));
         let kind = self.default_estimator;
-        let filter = of(kind).map(|params| params.strain_sd_scale);
-        let smoother = of(kind).and_then(|params| params.smoothed_sd_scale);
+        let scaled = |kind: &EstimatorKind| *kind != EstimatorKind::StaticCubic;
+        let filter = Some(kind).filter(scaled).and_then(of).map(|params| params.strain_sd_scale);
+        let smoother =
+            Some(self.smoother_of(kind)).filter(scaled).and_then(of).and_then(|params| params.smoothed_sd_scale);
         let widened = [("filter", filter), ("smoother", smoother)];
         let at_most = |scale: Option<f64>| scale.is_some_and(|scale| scale >= LARGEST_SD_SCALE);
         widened.into_iter().filter(|(_, scale)| at_most(*scale)).map(|(name, _)| name).collect()

@@ -163,6 +163,7 @@ impl Resolution {
 
 impl StaticCubic {
     fn validate(&self, table: &Table) -> Result<(), FieldError> {
+        table.some("error_sd", self.error_sd, AMOUNT)?;
         check!(table, self; reading_centre: POSITIVE, reading_scale: POSITIVE)?;
         table.numbers("coefficients", &self.coefficients, SIGNED)?;
         table.range("range", self.range)

@@ -1,6 +1,8 @@
 use std::sync::Arc;
 
-use ohmstrain_ekf::live::{DoubtParts, LiveParts, Protections, RestBounds, SensorEstimator, Sieve, Unread};
+use ohmstrain_ekf::live::{
+    DoubtParts, LiveParts, Protections, RestBounds, SensorEstimator, Sieve, StaticCurve, Unread,
+};
 use ohmstrain_ekf::{
     AnyCurve, Compact, Dwell, Evidence, Hypotheses, Imm, Settling, SigmaPoints, SignSplit, SparseEkf, State,
 };
@@ -61,7 +63,7 @@ pub fn build_smoother_with(
     kind: Option<EstimatorKind>,
     options: &Options,
 ) -> Result<Box<dyn Smoother>, SensorError> {
-    let kind = kind.unwrap_or(params.default_estimator);
+    let kind = params.smoother_of(kind.unwrap_or(params.default_estimator));
     let recipe = FilterParts::of(params, kind, *options)?;
     recipe.smoother(needed(learned, kind)?)
 }
@@ -77,11 +79,13 @@ fn needed(learned: Option<&Arc<Learned>>, kind: EstimatorKind) -> Result<Option<
 /// Parts of a filter without its correction.
 #[derive(Clone, Copy)]
 pub struct FilterParts<'a> {
-    /// Kind of filter, never [`EstimatorKind::Corrected`].
+    /// Kind of filter, never [`EstimatorKind::Corrected`] or [`EstimatorKind::StaticCubic`].
     kind: EstimatorKind,
     law: &'a LawParams,
     estimator: EstimatorParams,
     parts: LiveParts<f64, ()>,
+    /// Curve that gives the strain in place of the filter.
+    curve: Option<StaticCurve<f64>>,
     options: Options,
     /// Factor on the longest step between readings.
     step_factor: f64,
@@ -91,9 +95,11 @@ impl<'a> FilterParts<'a> {
     /// Collects the parts of a calibrated sensor's filter.
     fn of(params: &'a SensorParams, kind: EstimatorKind, options: Options) -> Result<Self, SensorError> {
         params.validate()?;
+        let curve = params.curve_of(kind)?;
         let kind = params.filter_of(kind);
         let estimator = *params.estimator(kind)?;
-        Ok(Self { kind, law: &params.law, estimator, parts: params.live_parts(&estimator), options, step_factor: 1.0 })
+        let parts = params.live_parts(&estimator);
+        Ok(Self { kind, law: &params.law, estimator, parts, curve, options, step_factor: 1.0 })
     }
 
     /// Collects the parts of a filter for a law that is being calibrated, when nothing is known yet about the readings.
@@ -104,7 +110,13 @@ impl<'a> FilterParts<'a> {
         limits: StrainRange<f64>,
     ) -> Self {
         let parts = bare_parts(&estimator, limits);
-        Self { kind, law, estimator, parts, options: Options::plain(), step_factor: 1.0 }
+        Self { kind, law, estimator, parts, curve: None, options: Options::plain(), step_factor: 1.0 }
+    }
+
+    /// Sets a curve that gives the strain in place of the filter.
+    #[must_use]
+    pub fn on_curve(self, curve: Option<StaticCurve<f64>>) -> Self {
+        Self { curve, ..self }
     }
 
     /// Takes steps of up to `factor` times the longest step between readings, which is faster and less exact.
@@ -154,10 +166,10 @@ impl<'a> FilterParts<'a> {
         parts: LiveParts<f64, SharedCorrection>,
         learned: Option<Arc<Learned>>,
     ) -> Result<Box<dyn Both>, SensorError> {
-        let Self { kind, law, ref estimator, options, step_factor, .. } = self;
+        let Self { kind, law, ref estimator, curve, options, step_factor, .. } = self;
         let model = switched::<B, N>(law, estimator)?;
         let refused = SensorError::Start;
-        let reports = reports(estimator, model, &parts.limits, &options);
+        let reports = Reports { curve, ..reports(estimator, model, &parts.limits, &options) };
         let limits = parts.limits;
         let with = With { parts, reports, learned, options, step_factor };
         Ok(match kind {
@@ -166,7 +178,7 @@ impl<'a> FilterParts<'a> {
                 let filter = SparseEkf::<_, Compact, B, N, SigmaPoints<AnyCurve<f64>>>::at_a_moment(model);
                 with.run::<_, L>(filter.map_err(refused)?)
             }
-            EstimatorKind::Corrected => return Err(NoParameters { kind }.into()),
+            EstimatorKind::Corrected | EstimatorKind::StaticCubic => return Err(NoParameters { kind }.into()),
             EstimatorKind::Imm => {
                 let PhaseFilter { dwell, evidence, .. } = PhaseFilter::new(kind, estimator, limits)?;
                 with.run::<_, L>(Imm::<_, B, N>::new(model, NO_STEP_S, dwell, evidence).map_err(refused)?)
@@ -250,6 +262,7 @@ fn reports<const B: usize, const N: usize>(
     Reports {
         model,
         limits: *limits,
+        curve: None,
         settling: estimator.settling.unwrap_or_else(unseen),
         filtered_scale: estimator.strain_sd_scale,
         smoothed_scale: estimator.smoothed_sd_scale.unwrap_or(1.0),
@@ -291,6 +304,14 @@ fn bare_parts(estimator: &EstimatorParams, limits: StrainRange<f64>) -> LivePart
 }
 
 impl SensorParams {
+    /// Returns the curve that gives an estimator's strain, if one does.
+    pub(crate) fn curve_of(&self, kind: EstimatorKind) -> Result<Option<StaticCurve<f64>>, NoParameters> {
+        if kind != EstimatorKind::StaticCubic {
+            return Ok(None);
+        }
+        self.static_cubic.curve(self.rest_reading).map(Some).ok_or(NoParameters { kind })
+    }
+
     /// Components around the filter with that estimator, without a correction.
     pub(crate) fn live_parts(&self, estimator: &EstimatorParams) -> LiveParts<f64, ()> {
         LiveParts {

@@ -1,7 +1,7 @@
 //! A filter as plain numbers, for programs that generate it in another language.
 
 use ohmstrain_ekf::correction::{FILTER_INPUTS, FeatureScale};
-use ohmstrain_ekf::live::LiveParts;
+use ohmstrain_ekf::live::{LiveParts, StaticCurve};
 
 use crate::SensorError;
 use crate::correction::OwnedCorrection;
@@ -13,7 +13,7 @@ use crate::run::learned::Learned;
 /// A sensor's filter, with the components around it.
 #[derive(Clone, Debug)]
 pub struct PortableFilter {
-    /// Filter that propagates the state: never [`EstimatorKind::Corrected`].
+    /// Filter that propagates the state: never [`EstimatorKind::Corrected`] or [`EstimatorKind::StaticCubic`].
     pub kind: EstimatorKind,
     /// Maximum number of hypotheses; 1 for a single Gaussian.
     pub hypotheses: usize,
@@ -23,6 +23,8 @@ pub struct PortableFilter {
     pub parts: LiveParts<f64, ()>,
     /// Correction of its strain.
     pub correction: Option<PortableCorrection>,
+    /// Curve that gives the strain in place of the filter.
+    pub curve: Option<StaticCurve<f64>>,
 }
 
 /// The learned correction of a filter's strain.
@@ -42,6 +44,7 @@ impl PortableFilter {
     pub fn new(params: &SensorParams, kind: Option<EstimatorKind>) -> Result<Self, SensorError> {
         params.validate()?;
         let asked = kind.unwrap_or(params.default_estimator);
+        let curve = params.curve_of(asked)?;
         let kind = params.filter_of(asked);
         let estimator = *params.estimator(kind)?;
         let learned = Learned::of(params).filter(|_| asked == EstimatorKind::Corrected);
@@ -56,6 +59,6 @@ impl PortableFilter {
             _ => 1,
         };
         let parts = params.live_parts(&estimator);
-        Ok(Self { kind, hypotheses, estimator, parts, correction })
+        Ok(Self { kind, hypotheses, estimator, parts, correction, curve })
     }
 }

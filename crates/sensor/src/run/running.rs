@@ -3,7 +3,9 @@ use std::mem;
 use std::sync::Arc;
 
 use ohmstrain_ekf::correction::{FILTER_INPUTS, mixture};
-use ohmstrain_ekf::live::{Correct, Doubts, Flags, LiveFilter, LiveParts, LiveRow, Measured, SensorEstimator};
+use ohmstrain_ekf::live::{
+    Correct, Doubts, Flags, LiveFilter, LiveParts, LiveRow, Measured, SensorEstimator, StaticCurve,
+};
 use ohmstrain_ekf::{Estimate, Estimator, Gaussian, PastStep, Reading, Settling, State, StepError};
 use ohmstrain_model::{StrainRange, SwitchedModel};
 use serde::Serialize;
@@ -56,6 +58,8 @@ pub(crate) struct Running<E: SensorEstimator<f64, N, L>, const B: usize, const N
 pub(crate) struct Reports<const B: usize, const N: usize> {
     pub model: SwitchedModel<f64, B, N>,
     pub limits: StrainRange<f64>,
+    /// Curve that gives the strain in place of the estimator.
+    pub curve: Option<StaticCurve<f64>>,
     pub settling: Settling<f64>,
     /// Factors on the strain's standard deviation.
     pub filtered_scale: f64,
@@ -72,8 +76,12 @@ impl<const B: usize, const N: usize> Reports<B, N> {
         measured: &Measured<f64>,
         sd_scale: f64,
     ) -> Output {
+        let mut estimate = Estimate::new(&self.model, state, &self.limits, sd_scale, &self.settling);
+        if let Some(strain) = self.curve.and_then(|curve| measured.on_curve(&curve)) {
+            estimate.strain = strain;
+        }
         Output {
-            estimate: Estimate::new(&self.model, state, &self.limits, sd_scale, &self.settling),
+            estimate,
             nis: measured.nis,
             verdict: measured.verdict,
             phases: state.phases(),
@@ -97,7 +105,7 @@ where
         options: &Options,
     ) -> Self {
         let longest_step_s = floored(estimator.longest_step_s().min(parts.longest_step_s));
-        let live = LiveFilter::new(estimator, LiveParts { longest_step_s, ..parts });
+        let live = LiveFilter::new(estimator, LiveParts { longest_step_s, ..parts }).on_curve(reports.curve);
         let mut live = live.protected_by(options.protections).guarded_by(options.guard);
         if let Some(strain) = options.start.strain() {
             live.start_at(Some(strain));

@@ -4,7 +4,7 @@ use std::time::Instant;
 use ohmstrain::trace::TraceFile;
 use ohmstrain::{Calibrated, Calibration, ValidityWatch};
 use ohmstrain_bench_data::segment;
-use ohmstrain_calib::{Baselines, PhaseRows, PublishedLaw, RECIPE};
+use ohmstrain_calib::{Baselines, PhaseRows, PublishedLaw};
 use ohmstrain_sensor::{EstimatorKind, StaticCubic};
 
 use super::known_strains::KnownStrains;
@@ -74,16 +74,18 @@ impl JudgedSensor {
         progress: &Progress,
     ) -> Result<Vec<Self>, CliError> {
         let wanted = match estimators {
-            Estimators::Auto => vec![RECIPE.estimator],
-            Estimators::All => {
-                EstimatorKind::ALL.into_iter().filter(|kind| corrects || *kind != EstimatorKind::Corrected).collect()
-            }
-            Estimators::One(kind) => vec![kind],
+            Estimators::Auto => vec![None],
+            Estimators::All => EstimatorKind::ALL
+                .into_iter()
+                .filter(|kind| corrects || *kind != EstimatorKind::Corrected)
+                .map(Some)
+                .collect(),
+            Estimators::One(kind) => vec![Some(kind)],
         };
-        let calibrate = |kind| {
+        let calibrate = |kind: Option<EstimatorKind>| {
             let start = Instant::now();
-            let Calibrated { sensor, .. } =
-                calibrate_recordings(training, Calibration::new().estimator(kind), progress)?;
+            let calibration = kind.map_or_else(Calibration::new, |kind| Calibration::new().estimator(kind));
+            let Calibrated { sensor, .. } = calibrate_recordings(training, calibration, progress)?;
             let calibration_s = Some(start.elapsed().as_secs_f64());
             let kind = sensor.params().default_estimator;
             let filter = sensor.params().filter_of(kind);
@@ -96,7 +98,7 @@ impl JudgedSensor {
         let calibrated = wanted.iter().map(|kind| calibrate(*kind)).collect::<Result<Vec<_>, CliError>>()?;
         let sensors = calibrated.into_iter().flatten().flatten();
         // A part that was requested by itself is not shown twice.
-        Ok(sensors.filter(|sensor| !(sensor.is_part && wanted.contains(&sensor.kind))).collect())
+        Ok(sensors.filter(|sensor| !(sensor.is_part && wanted.contains(&Some(sensor.kind)))).collect())
     }
 
     /// Scores some rows of a recording, with the filter started at the first row and given the strains of `given`; `None`
