@@ -189,11 +189,11 @@ fn c_is_an_arduino_library_a_self_test_and_a_readme_and_the_same_every_time() {
     }
 }
 
-const ESTIMATORS: [&str; 4] = ["corrected", "sign-split", "hypotheses", "ekf"];
+const ESTIMATORS: [&str; 5] = ["corrected", "sign-split", "hypotheses", "ekf", "static-cubic"];
 
 /// Returns a folder with a recording, and a sensor for each filter that can be exported.
 pub fn every_filter() -> Bench {
-    static FILES: OnceLock<(String, [String; 4])> = OnceLock::new();
+    static FILES: OnceLock<(String, [String; ESTIMATORS.len()])> = OnceLock::new();
     let (trace, sensors) = FILES.get_or_init(|| {
         let bench = Bench::new();
         let simulate = ["simulate", "--material", "representative", "--protocol", "mixed", "--speed-mm-s", "5"];

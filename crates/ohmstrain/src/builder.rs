@@ -307,7 +307,12 @@ impl<'a> FilterBuilder<'a> {
     /// Returns the chosen estimator.
     pub(crate) fn kind(&self) -> EstimatorKind {
         let kind = self.estimator.unwrap_or(self.sensor.params().default_estimator);
-        if self.corrects { kind } else { self.sensor.params().filter_of(kind) }
+        if self.corrects { kind } else { self.sensor.params().without_correction(kind) }
+    }
+
+    /// Returns the estimator that smooths for the chosen one.
+    pub(crate) fn smoothers_kind(&self) -> EstimatorKind {
+        if self.corrects { self.sensor.params().smoother_of(self.kind()) } else { self.kind() }
     }
 
     /// Builds the forward filter, with its conversion to rows.

@@ -89,8 +89,8 @@ impl<'a> Calibration<'a> {
         Self { prior: None, estimator: None, branches: None, gauge: None, temperature: None }
     }
 
-    /// Sets the estimator that is calibrated and becomes the sensor's default; the extended Kalman filter is calibrated in any
-    /// case.
+    /// Sets the estimator that is calibrated and becomes the sensor's default, in place of the better one of the corrected filter and the
+    /// static cubic; the extended Kalman filter is calibrated in any case.
     ///
     /// ```
     /// use ohmstrain::{Calibration, EstimatorKind};

@@ -2,7 +2,7 @@ use std::ops::Range;
 
 use ohmstrain_ekf::live::RestFollower;
 use ohmstrain_ekf::{Gaussian, StepError};
-use ohmstrain_sensor::{KnownStrain, Rows};
+use ohmstrain_sensor::{EstimatorKind, KnownStrain, Rows};
 
 use crate::estimate::Scale;
 use crate::known::{KnownOfAll, in_order, next_until};
@@ -117,7 +117,8 @@ impl FilterBuilder<'_> {
         mut take: impl FnMut(Range<usize>, &[Estimate]) -> Result<(), E>,
     ) -> Result<(), E> {
         let starts_known = self.initial_strain.is_some();
-        let kind = self.sensor.params().smoother_of(self.kind());
+        let kind = self.smoothers_kind();
+        let on_curve = kind == EstimatorKind::StaticCubic;
         let mut smoother = self.sensor.build_smoother(kind, &self.options()?)?;
         let (scale, mut doubts) = (self.scale()?, self.smoothers_doubts(kind)?);
         let failed = |(row, source): (usize, StepError)| Error::Row { row, source };
@@ -149,7 +150,8 @@ impl FilterBuilder<'_> {
                 if let Some(doubts) = doubts.as_mut().filter(|_| k > 0 || !starts_known) {
                     let estimate = &output.estimate;
                     // Doubts refer to readings relative to calibration, corrected for the session's R₀.
-                    let taken = output.verdict.is_taken().then(|| (calibrated(k).1, output.nis));
+                    let nis = output.nis.filter(|_| !on_curve);
+                    let taken = output.verdict.is_taken().then(|| (calibrated(k).1, nis));
                     let of_session = |reading| follower.map_or(reading, |follower| follower.of_session(reading));
                     let taken = taken.and_then(|(reading, nis)| Some((of_session(reading?.value), nis.unwrap_or(0.0))));
                     let unturned_s = back.turns().around(time_s);

@@ -83,6 +83,30 @@ fn rows_without_a_reading_are_the_filters_and_the_smoother_is_no_worse() {
     assert!(error(&smoothed) < 1.05 * error(&rows), "{} {}", error(&smoothed), error(&rows));
 }
 
+/// A sensor whose default is the curve has a correction only if that smooths better. A caller's choice is the caller's.
+#[test]
+fn the_corrected_filter_smooths_for_the_curve_only_as_its_default() {
+    let text = include_str!("../../../tests/fixtures/representative.toml");
+    let with_default = |name: &str| {
+        let changed = text.replace("default_estimator = \"corrected\"", &format!("default_estimator = \"{name}\""));
+        Sensor::from_toml(&changed).unwrap()
+    };
+    let (time_s, reading, _) = rows(4, false);
+    // Within the readings of that sensor.
+    let reading: Vec<f64> = reading.iter().map(|ohm| 3.4 * ohm).collect();
+    let smoothed = |sensor: &Sensor, kind: Option<EstimatorKind>, is_corrected: bool| -> Vec<f64> {
+        let builder = kind.map_or_else(|| sensor.filter(), |kind| sensor.filter().estimator(kind));
+        let builder = if is_corrected { builder } else { builder.without_correction() };
+        builder.smooth(&time_s, &reading).unwrap().iter().map(|row| row.strain).collect()
+    };
+    let (usual, of_curve) = (with_default("corrected"), with_default("static-cubic"));
+    let corrected = smoothed(&usual, None, true);
+    let curve = smoothed(&usual, Some(EstimatorKind::StaticCubic), true);
+    assert_ne!(curve, corrected);
+    assert_eq!(smoothed(&of_curve, None, true), corrected);
+    assert_eq!(smoothed(&of_curve, None, false), curve);
+}
+
 #[test]
 fn it_can_be_asked_for() {
     let sensor = calibrated();

@@ -7,7 +7,8 @@ use crate::CalibrationError;
 use crate::samples::Samples;
 use ohmstrain_sensor::StaticCubic;
 
-/// Fits by least squares over all rows with reading and strain. The error is that of these rows, for as many degrees of freedom.
+/// Fits by least squares over all rows with reading and strain. `error_sd` is the standard deviation of the residuals, with four degrees of
+/// freedom subtracted.
 ///
 /// # Errors
 /// If the readings do not vary.

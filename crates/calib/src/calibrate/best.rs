@@ -3,10 +3,14 @@
 use crate::calibrate::findings::Checked;
 use ohmstrain_sensor::EstimatorKind;
 
+/// Smallest number of full strokes in which held-out quarters tell which estimator is better. In a stretch and a release each quarter has what no
+/// other one has, and the filter that has learned from all of them is better than those without it.
+const FEWEST_STROKES: f64 = 3.0;
+
 /// Role of the static cubic in a calibration.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum StaticCubicAs {
-    /// Others are compared with it.
+    /// Baseline for comparison.
     Baseline,
     /// It becomes the default if it is the better one on held-out quarters.
     Candidate,
@@ -15,12 +19,14 @@ pub(crate) enum StaticCubicAs {
 }
 
 impl StaticCubicAs {
-    /// Returns its role if these estimators are requested.
-    pub(crate) fn of(kinds: &[EstimatorKind]) -> Self {
-        match (kinds.contains(&EstimatorKind::StaticCubic), kinds.len()) {
+    /// Returns the role of the static cubic among the requested estimators, in a calibration with that many strokes.
+    pub(crate) fn of(kinds: &[EstimatorKind], strokes: f64) -> Self {
+        let is_cubic = |kind: &EstimatorKind| *kind == EstimatorKind::StaticCubic;
+        match (kinds.iter().any(is_cubic), kinds.iter().all(is_cubic)) {
             (false, _) => Self::Baseline,
-            (true, 1) => Self::Default,
-            (true, _) => Self::Candidate,
+            (true, true) => Self::Default,
+            (true, false) if strokes < FEWEST_STROKES => Self::Baseline,
+            (true, false) => Self::Candidate,
         }
     }
 }
@@ -35,28 +41,28 @@ pub(crate) struct Best {
 }
 
 impl Best {
-    /// Chooses between `whole`, an estimator with the filter behind it, and the static cubic.
+    /// Chooses between `filter`, an estimator with the filter behind it, and the static cubic.
     pub(crate) fn on_held_out(
-        whole: (EstimatorKind, EstimatorKind),
+        filter: (EstimatorKind, EstimatorKind),
         static_cubic: StaticCubicAs,
         check: impl Fn((EstimatorKind, EstimatorKind)) -> Option<Checked>,
     ) -> Self {
-        let of_whole = if static_cubic == StaticCubicAs::Default { None } else { check(whole) };
-        let is_worse = |checked: &Checked| checked.findings.static_cubic.rmse < checked.findings.filter.rmse;
-        let is_tried = static_cubic == StaticCubicAs::Default
-            || static_cubic == StaticCubicAs::Candidate && of_whole.as_ref().is_some_and(is_worse);
         let default = EstimatorKind::StaticCubic;
-        let of_cubic = if is_tried { check((default, EstimatorKind::Ekf)) } else { None };
-        match (of_cubic, of_whole) {
-            (Some(cubic), Some(of_whole)) if !of_whole.filters_better_than(&cubic) => {
-                if whole.0 == EstimatorKind::Corrected && of_whole.smooths_better_than(&cubic) {
-                    Self { default, smoother: whole.0, checked: Some(cubic.smoothed_as(&of_whole)) }
+        let of_cubic = || check((default, EstimatorKind::Ekf));
+        if static_cubic == StaticCubicAs::Default {
+            return Self { default, smoother: default, checked: of_cubic() };
+        }
+        let of_filter = check(filter);
+        let of_cubic = if static_cubic == StaticCubicAs::Candidate { of_cubic() } else { None };
+        match (of_cubic, of_filter) {
+            (Some(cubic), Some(of_filter)) if cubic.filters_better_than(&of_filter) => {
+                if filter.0 == EstimatorKind::Corrected && of_filter.smooths_better_than(&cubic) {
+                    Self { default, smoother: filter.0, checked: Some(cubic.smoothed_as(&of_filter)) }
                 } else {
                     Self { default, smoother: default, checked: Some(cubic) }
                 }
             }
-            (checked, None) if is_tried => Self { default, smoother: default, checked },
-            (_, checked) => Self { default: whole.0, smoother: whole.0, checked },
+            (_, checked) => Self { default: filter.0, smoother: filter.0, checked },
         }
     }
 }

@@ -236,7 +236,9 @@ impl Check<'_> {
                     LeftOutRow { recording: r, row: k, truth, strain, strain_sd, smoothed, static_cubic: on_cubic };
                 of_recording.rows.push(left_out);
                 of_recording.filter.push(row(strain, Some(strain_sd)));
-                of_recording.directions.push((directions[r][k], estimate.rate.mean, strain - truth));
+                if curve.is_none() {
+                    of_recording.directions.push((directions[r][k], estimate.rate.mean, strain - truth));
+                }
                 of_recording.smoother.push(row(smoothed.strain, Some(smoothed.sd)));
                 of_recording.static_cubic.push(row(on_cubic, None));
             }

@@ -154,7 +154,7 @@ fn calibrate_arranged(
     let of_make = prior.and_then(|prior| prior.correction.as_ref());
     let correction =
         corrected.map(|kind| correction(recordings, fit, (kind, of_make), &estimators)).transpose()?.flatten();
-    let whole = correction.as_ref().map_or((best, best), |correction| (EstimatorKind::Corrected, correction.corrects));
+    let filter = correction.as_ref().map_or((best, best), |correction| (EstimatorKind::Corrected, correction.corrects));
     let limits = fit.law.law.range;
     (steps.progress)(Stage::LeftOut);
     let identifiability = identifiability(recordings, &fit.law.law).ok();
@@ -164,7 +164,7 @@ fn calibrate_arranged(
         Check { recordings, strokes, fit, kind, filter, estimators: &estimators, of_make }
             .checked(seen, &identifiability)
     };
-    let Best { default: default_estimator, smoother, checked } = Best::on_held_out(whole, asked.static_cubic, check);
+    let Best { default: default_estimator, smoother, checked } = Best::on_held_out(filter, asked.static_cubic, check);
     let correction = correction.filter(|_| smoother == EstimatorKind::Corrected);
     if default_estimator == EstimatorKind::StaticCubic && correction.is_none() {
         estimators.retain(|kind, _| *kind == EstimatorKind::Ekf || asked.named.contains(kind));
@@ -222,7 +222,7 @@ impl<'a> Asked<'a> {
         };
         let is_filter = |kind: &EstimatorKind| !matches!(kind, EstimatorKind::Corrected | EstimatorKind::StaticCubic);
         let mut named: Vec<EstimatorKind> = kinds.iter().copied().filter(is_filter).collect();
-        let static_cubic = StaticCubicAs::of(kinds);
+        let static_cubic = StaticCubicAs::of(kinds, stats.strokes);
         if static_cubic == StaticCubicAs::Default {
             named.push(EstimatorKind::Ekf);
         }

@@ -31,7 +31,7 @@ impl LawOptions {
         const TWO: LawOptions = LawOptions::with_branches(DEFAULT_BRANCHES);
         const ANY: [LawOptions; 3] = [LawOptions::with_branches(1), TWO, LawOptions::with_branches(3)];
         match kind {
-            EstimatorKind::Ekf | EstimatorKind::SignSplit => &ANY,
+            EstimatorKind::Ekf | EstimatorKind::SignSplit | EstimatorKind::StaticCubic => &ANY,
             _ => &[TWO],
         }
     }

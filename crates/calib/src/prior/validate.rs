@@ -73,7 +73,7 @@ impl EstimatorPrior {
 
 impl CorrectionPrior {
     fn validate(&self, table: &Table) -> Result<(), FieldError> {
-        if self.corrects == EstimatorKind::Corrected {
+        if matches!(self.corrects, EstimatorKind::Corrected | EstimatorKind::StaticCubic) {
             return Err(table.wrong("corrects", "a filter", self.corrects.name()));
         }
         table.scale("readings", &self.readings)?;

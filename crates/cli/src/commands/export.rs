@@ -1,6 +1,7 @@
 use std::path::Path;
 
 use ohmstrain_bench_data::Metadata;
+use ohmstrain_sensor::EstimatorKind;
 
 use crate::args::ExportArgs;
 use crate::commands::export_choice::{self, Choice};
@@ -32,7 +33,9 @@ pub fn run(args: &ExportArgs) -> Result<(), CliError> {
     let refused = |error: ExportError| CliError::export(&error, &args.sensor.display().to_string());
     let compared = recording.as_ref().map(|recording| recording.compared(params, &plan, args)).transpose()?;
     let promise = Promise::new(params, &plan, dt_s, compared.as_ref(), args.budget.as_ref()).map_err(refused)?;
-    let worse = |compared: &&Compared| compared.exported.rmse > compared.static_cubic.rmse;
+    // The static cubic is what a worse one is compared with.
+    let is_filter = plan.kind.unwrap_or(params.default_estimator) != EstimatorKind::StaticCubic;
+    let worse = |compared: &&Compared| is_filter && compared.exported.rmse > compared.static_cubic.rmse;
     let worse_on = compared.as_ref().filter(worse).and(recording.as_ref()).map(|recording| recording.name.as_str());
     let files =
         export::files(params, &plan, args.target.into(), dt_s, &args.prefix, &promise.lines).map_err(refused)?;

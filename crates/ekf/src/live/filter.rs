@@ -350,7 +350,8 @@ where
         let corrected = || self.corrected(look.as_ref().unwrap_or(&self.now.state), &moments, filtered);
         let stated = on_curve.unwrap_or_else(corrected);
         let now = &mut self.now;
-        let nis = measured.nis.unwrap_or(T::zero());
+        // The estimator's surprise says nothing about a curve.
+        let nis = measured.nis.filter(|_| on_curve.is_none()).unwrap_or(T::zero());
         let taken = reading.filter(|_| measured.used.is_some()).map(|reading| (reading.value, nis));
         if let (Some(follower), Some((reading, _))) = (&mut now.follower, taken) {
             measured.jumped.into_iter().for_each(|jump| follower.jumped(jump));
@@ -418,7 +419,8 @@ where
                 now.jumps.see(seen.value, nis, self.sieve.jump)
             });
         measured.jumped = jumped.filter(|_| measured.surprises());
-        measured.spike = measured.used.is_some() && now.jumps.may_be_spike();
+        let is_watched = measured.used.is_some() && verdict != ReadingVerdict::Readmitted;
+        measured.spike = is_watched && now.jumps.may_be_spike();
         (now.repeats, now.streak) = (repeats, guarded.streak);
         let look = if measured.used.is_some() {
             (now.state, now.pause) = (guarded.advanced.state, at_reading(&self.estimator, &self.parts));

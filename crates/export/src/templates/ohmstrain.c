@@ -660,7 +660,7 @@ static ohmstrain_status step(ohmstrain_state *state, float dt_s, const float *rh
             watch_turns(&seen, of_calibration);
         }
 {% endif %}
-        doubt_reading(&seen, of_calibration, of_step.nis);
+        doubt_reading(&seen, of_calibration, << "may_be_spike(&seen) ? of_step.nis : 0.0f" if curve else "of_step.nis" >>);
     } else {
         variance = doubt_pause(&seen, strain, variance);
     }

@@ -88,7 +88,7 @@ impl Closing<'_> {
         (!known.is_empty()).then(|| of(&known))
     }
 
-    /// True if all its known errors are below 0.9 times the static cubic's; `None` if none are known.
+    /// True if all its known errors are below 0.9 times the static cubic's; `None` if none are known, or if the default is the static cubic.
     ///
     /// ```
     /// fn warn(closing: &ohmstrain::Closing) {
@@ -99,7 +99,7 @@ impl Closing<'_> {
     /// ```
     #[must_use]
     pub fn is_better(&self) -> Option<bool> {
-        is_better(&self.known())
+        if self.params.default_estimator == EstimatorKind::StaticCubic { None } else { is_better(&self.known()) }
     }
 
     /// Returns a warning if the estimator was `chosen`, and is no better than a static curve.
@@ -111,9 +111,7 @@ impl Closing<'_> {
     /// ```
     #[must_use]
     pub fn warning(&self, chosen: Option<EstimatorKind>) -> Option<String> {
-        let is_one_of_many =
-            |chosen: &EstimatorKind| !matches!(chosen, EstimatorKind::Corrected | EstimatorKind::StaticCubic);
-        let chosen = chosen.filter(|chosen| is_one_of_many(chosen) && self.is_better() == Some(false))?;
+        let chosen = chosen.filter(|chosen| *chosen != EstimatorKind::Corrected && self.is_better() == Some(false))?;
         let (file, name) = (self.file.unwrap_or("the sensor"), chosen.name());
         Some(format!(
             "{file}: {name} is no better than a static curve; without --estimator, calibrate tries others and a correction"

@@ -102,13 +102,13 @@ pub fn verdict(known: &[Known]) -> String {
     format!("{better}; {}.", of_intervals(known))
 }
 
-/// Returns the sentence for a sensor whose default estimator is the static curve, by the worst of the scores.
+/// Returns the sentence for a sensor that is used with the static curve, by the worst of the scores.
 ///
 /// ```
-/// assert_eq!(ohmstrain::verdict::of_static_curve(&[]), "A static curve is best here; its error bars hold.");
+/// assert_eq!(ohmstrain::verdict::of_static_curve(&[]), "The estimate is a static curve; its error bars hold.");
 /// ```
 pub fn of_static_curve(known: &[Known]) -> String {
-    format!("A static curve is best here; {}.", of_intervals(known))
+    format!("The estimate is a static curve; {}.", of_intervals(known))
 }
 
 fn of_intervals(known: &[Known]) -> &'static str {

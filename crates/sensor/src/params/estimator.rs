@@ -22,7 +22,8 @@ pub enum EstimatorKind {
     Hypotheses,
     /// A filter with the learned correction of its strain.
     Corrected,
-    /// Strain as a cubic of the reading, with the extended Kalman filter's rate and protections.
+    /// Strain as a cubic of the reading, with the extended Kalman filter's rate and protections. Later readings and a strain known at the
+    /// start do not change it; a correction for known strains does.
     StaticCubic,
 }
 

@@ -271,18 +271,24 @@ impl SensorParams {
     /// Returns the filter behind an estimator: itself, the one whose strain is corrected, or the one beside the static cubic.
     #[must_use]
     pub fn filter_of(&self, kind: EstimatorKind) -> EstimatorKind {
+        if kind == EstimatorKind::StaticCubic { EstimatorKind::Ekf } else { self.without_correction(kind) }
+    }
+
+    /// Returns an estimator without the learned correction: the filter that is corrected, or the estimator itself.
+    #[must_use]
+    pub fn without_correction(&self, kind: EstimatorKind) -> EstimatorKind {
         match &self.correction {
             Some(correction) if kind == EstimatorKind::Corrected => correction.corrects,
-            _ if kind == EstimatorKind::StaticCubic => EstimatorKind::Ekf,
             _ => kind,
         }
     }
 
-    /// Returns the estimator that smooths for an estimator: itself, but for the static cubic the corrected filter, if the sensor has one.
+    /// Returns the estimator that smooths for an estimator: itself. A sensor whose default is the static cubic has a correction only if that
+    /// smooths better.
     #[must_use]
     pub fn smoother_of(&self, kind: EstimatorKind) -> EstimatorKind {
-        let has_better = kind == EstimatorKind::StaticCubic && self.correction.is_some();
-        if has_better { EstimatorKind::Corrected } else { kind }
+        let is_default = kind == EstimatorKind::StaticCubic && self.default_estimator == kind;
+        if is_default && self.correction.is_some() { EstimatorKind::Corrected } else { kind }
     }
 
     /// Returns `filter`, `smoother` or both: those of the default estimator, or of the filter that it corrects, whose intervals

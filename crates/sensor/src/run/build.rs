@@ -63,7 +63,7 @@ pub fn build_smoother_with(
     kind: Option<EstimatorKind>,
     options: &Options,
 ) -> Result<Box<dyn Smoother>, SensorError> {
-    let kind = params.smoother_of(kind.unwrap_or(params.default_estimator));
+    let kind = kind.unwrap_or_else(|| params.smoother_of(params.default_estimator));
     let recipe = FilterParts::of(params, kind, *options)?;
     recipe.smoother(needed(learned, kind)?)
 }

@@ -56,7 +56,7 @@ impl JudgedSensor {
             _ => vec![wanted.unwrap_or(sensor.params().default_estimator)],
         };
         let kinds = EstimatorKind::distinct(
-            kinds.into_iter().map(|kind| if corrects { kind } else { sensor.params().filter_of(kind) }),
+            kinds.into_iter().map(|kind| if corrects { kind } else { sensor.params().without_correction(kind) }),
         );
         let judged = |kind: EstimatorKind| {
             let name = kind.name();
@@ -65,8 +65,8 @@ impl JudgedSensor {
         Ok(kinds.into_iter().map(judged).collect())
     }
 
-    /// Calibrates a sensor for each requested estimator, at least one, as `calibrate --estimator` does. A correction is
-    /// followed by the filter that it corrects, as a part.
+    /// Calibrates a sensor for each requested estimator, at least one, as `calibrate --estimator` does. A corrected filter is
+    /// followed by the same without the correction, as a part.
     pub fn calibrated(
         training: &[TraceFile],
         estimators: Estimators,
@@ -88,7 +88,7 @@ impl JudgedSensor {
             let Calibrated { sensor, .. } = calibrate_recordings(training, calibration, progress)?;
             let calibration_s = Some(start.elapsed().as_secs_f64());
             let kind = sensor.params().default_estimator;
-            let filter = sensor.params().filter_of(kind);
+            let filter = sensor.params().without_correction(kind);
             let (of_filter, name) = (filter.name(), kind.name());
             let part = Self { sensor: sensor.clone(), kind: filter, calibration_s, is_part: corrects, name: of_filter };
             let whole = Self { sensor, kind, calibration_s, is_part: false, name };

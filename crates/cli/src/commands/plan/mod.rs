@@ -161,7 +161,7 @@ fn text(sensor: &Sensor, name: &str, protocols: &Protocols, information: &[Infor
         text +=
             &wrapped(&format!("{} readings per s by {bits} come within a tenth of the least error.\n", enough.rate_hz));
     }
-    if let Some(summary) = params.summary.as_ref().filter(|_| params.correction.is_some()) {
+    if let Some(summary) = params.summary.as_ref().filter(|_| params.default_estimator == EstimatorKind::Corrected) {
         text += &wrapped(&format!(
             "With its correction this sensor's calibration left {} % on quarters left out.\n",
             fixed(summary.left_out_percent_fs, 1)

@@ -268,7 +268,8 @@ fn scored(
     readings: &[Reading],
 ) -> Result<Worth, CliError> {
     // A correction models the law's error on real readings, which simulated readings do not have.
-    let mut filter = sensor.filter().without_correction().build()?;
+    let params = sensor.params();
+    let mut filter = sensor.filter().estimator(params.filter_of(params.default_estimator)).build()?;
     let (mut squares, mut inside, mut count) = (0.0, 0_usize, 0_usize);
     for ((time_s, truth), reading) in times(strain.len(), rate_hz).into_iter().zip(strain).zip(readings) {
         let row = filter.step(time_s, *reading)?;

@@ -14,7 +14,7 @@ const ROWS: std::ops::RangeInclusive<usize> = 2..=1000;
 
 impl CorrectionParams {
     pub(crate) fn validate(&self, table: &Table) -> Result<(), FieldError> {
-        if self.corrects == EstimatorKind::Corrected {
+        if matches!(self.corrects, EstimatorKind::Corrected | EstimatorKind::StaticCubic) {
             return Err(table.wrong("corrects", "a filter", self.corrects.name()));
         }
         table.scale("readings", &self.readings)?;
