@@ -3,8 +3,8 @@
 use crate::calibrate::findings::Checked;
 use ohmstrain_sensor::EstimatorKind;
 
-/// Smallest number of full strokes in which held-out quarters tell which estimator is better. In a stretch and a release each quarter has what no
-/// other one has, and the filter that has learned from all of them is better than those without it.
+/// Smallest number of full strokes in which held-out quarters tell which estimator is better. In a stretch and a release each quarter has
+/// what no other one has, and the filter that has learned from all of them is better than those without it.
 const FEWEST_STROKES: f64 = 3.0;
 
 /// Role of the static cubic in a calibration.

@@ -11,8 +11,8 @@ pub struct Recipe {
     pub estimators: &'static [EstimatorKind],
 }
 
-/// One filter under one law with one learned correction, or the static cubic; the same on a laptop and on a chip. Sign-split follows a body that moves; phase
-/// histories keep their direction through holds of minutes.
+/// One filter under one law with one learned correction, or the static cubic; the same on a laptop and on a chip. Sign-split follows a body
+/// that moves; phase histories keep their direction through holds of minutes.
 pub const RECIPE: Recipe = Recipe {
     filters: &[EstimatorKind::SignSplit, EstimatorKind::Hypotheses],
     estimators: &[EstimatorKind::Corrected, EstimatorKind::StaticCubic],

@@ -5,7 +5,7 @@ use crate::{Gaussian, Recordable};
 /// Strain as a cubic polynomial of one reading, with a constant error: the usual method, for a sensor without memory.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StaticCurve<T> {
-    /// Reading `R/R₀ - 1` at which z = 0.
+    /// Reading, `R/R₀ - 1` in a filter, at which z = 0.
     pub centre: T,
     /// Distance of the reading from `centre` that counts as one.
     pub half_range: T,
@@ -18,7 +18,7 @@ pub struct StaticCurve<T> {
 }
 
 impl<T: Recordable> StaticCurve<T> {
-    /// Returns the strain for a reading `R/R₀ - 1`.
+    /// Returns the strain for a reading.
     #[must_use]
     pub fn strain(&self, reading: T) -> Gaussian<T> {
         let z = (reading - self.centre) / self.half_range;

@@ -24,20 +24,17 @@ impl StaticCubic {
     /// Returns the strain for a reading.
     #[must_use]
     pub fn strain(&self, reading: f64) -> f64 {
-        let z = (reading - self.reading_centre) / self.reading_scale;
-        let [a, b, c, d] = self.coefficients;
-        self.range.clamp(a + z * (b + z * (c + z * d)))
+        self.scaled(self.reading_centre, self.reading_scale, 0.0).strain(reading).mean
     }
 
     /// Returns it as a function of `R/R₀ - 1`, with this R₀ and its error; `None` if the error is unknown.
     #[must_use]
     pub fn curve(&self, rest_reading: f64) -> Option<StaticCurve<f64>> {
-        self.error_sd.map(|sd| StaticCurve {
-            centre: self.reading_centre / rest_reading - 1.0,
-            half_range: self.reading_scale / rest_reading,
-            coefficients: self.coefficients,
-            range: self.range,
-            variance: sd * sd,
-        })
+        let (centre, half_range) = (self.reading_centre / rest_reading - 1.0, self.reading_scale / rest_reading);
+        self.error_sd.map(|sd| self.scaled(centre, half_range, sd * sd))
+    }
+
+    fn scaled(&self, centre: f64, half_range: f64, variance: f64) -> StaticCurve<f64> {
+        StaticCurve { centre, half_range, coefficients: self.coefficients, range: self.range, variance }
     }
 }
