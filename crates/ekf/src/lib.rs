@@ -24,9 +24,10 @@
 //! `dual` computes Jacobians of a model in [`kalman`]. `simd` steps four hypotheses at once on processors with AVX2, or in
 //! WebAssembly with vectors. `adskalman` passes linearised steps to that crate. All features are off by default. The following
 //! work without std:
-//! - `serde`: [`Belief`], mixtures, [`Estimate`], [`Gaussian`], readings, innovations, verdicts of readings and errors as plain data;
-//!   and [`live::Memory`], the whole state of a running filter. A deserialised belief is not checked; a step that is impossible
-//!   from it is rejected. Types whose constructors validate are left out.
+//! - `serde`: [`Belief`], [`Estimate`], [`Gaussian`], readings, innovations, verdicts of readings and errors as plain data;
+//!   and [`live::Memory`], the whole state of a running filter, whose estimator's state becomes numbers ([`PlainState`]). A
+//!   deserialised belief is not checked; a step that is impossible from it is rejected. Types whose constructors validate are
+//!   left out.
 //! - `defmt`: `Format` for beliefs and related types, but not for mixtures. The target sends only numbers, no text.
 //!
 //! ```
@@ -76,6 +77,7 @@ pub mod kalman;
 mod kernel;
 pub mod live;
 mod mixture;
+mod plain;
 #[cfg(feature = "record")]
 pub mod record;
 mod residual;
@@ -98,6 +100,7 @@ pub use kernel::{
     SparseEkf, Switch,
 };
 pub use mixture::{Dwell, Evidence, Hypotheses, Imm, Mixture, MixtureResidual, PhaseMixture, Share, SignSplit};
+pub use plain::PlainState;
 pub use residual::Residual;
 pub use smooth::{PastStep, rts_step, smooth_back_through};
 pub use substeps::{

@@ -13,8 +13,6 @@ mod retry;
 pub(crate) mod sign_split;
 pub(crate) mod spawn;
 mod state;
-#[cfg(feature = "serde")]
-mod stored;
 mod switching;
 
 pub use evidence::{Evidence, MixtureResidual};

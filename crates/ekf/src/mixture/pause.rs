@@ -3,12 +3,12 @@
 use ohmstrain_model::{Phase, Scalar};
 
 use crate::Belief;
+use crate::plain::{PlainState, index};
 use crate::substeps::GRACE;
 use crate::{Gaussian, Real};
 
 /// Time without a reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Pause<T> {
     seconds: T,
     /// True if moving hypotheses keep the phase of their parents, and their rates may have either sign by now.
@@ -24,6 +24,18 @@ impl<T: Scalar> Pause<T> {
     pub(crate) fn goes_on(self, dt_s: T, longest_s: T) -> Self {
         let seconds = self.seconds + dt_s;
         Self { seconds, open: seconds > longest_s * T::of(GRACE) }
+    }
+}
+
+impl<T: Scalar> PlainState<T> for Pause<T> {
+    fn each_number(&self, visit: &mut dyn FnMut(T)) {
+        visit(self.seconds);
+        visit(if self.open { T::one() } else { T::zero() });
+    }
+
+    fn from_numbers(numbers: &mut dyn Iterator<Item = T>) -> Option<Self> {
+        let seconds = numbers.next()?;
+        Some(Self { seconds, open: index(numbers.next()?, 2)? == 1 })
     }
 }
 

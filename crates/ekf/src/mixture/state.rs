@@ -1,6 +1,4 @@
 use nalgebra::SVector;
-#[cfg(feature = "serde")]
-use ohmstrain_model::Scalar;
 use ohmstrain_model::{Phase, Symmetric};
 
 use crate::Real;
@@ -10,11 +8,6 @@ use crate::{Belief, Gaussian, State};
 
 /// A Gaussian and its share of a mixture. Shares are probabilities, not logarithms, so that steps need no conversion.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(serialize = "T: Scalar + serde::Serialize", deserialize = "T: Scalar + serde::Deserialize<'de>"))
-)]
 pub struct Share<T, const N: usize, const L: usize> {
     /// Probability of the hypothesis; zero if it is not followed.
     pub weight: T,
@@ -36,11 +29,6 @@ impl<T: Real, const N: usize, const L: usize> Share<T, N, L> {
 
 /// One Gaussian per phase, the state of [`Imm`](crate::Imm).
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(serialize = "T: Scalar + serde::Serialize", deserialize = "T: Scalar + serde::Deserialize<'de>"))
-)]
 pub struct PhaseMixture<T, const N: usize, const L: usize> {
     pub(crate) modes: [Share<T, N, L>; 3],
 }
@@ -149,12 +137,6 @@ impl<T: Real, const N: usize, const L: usize, const K: usize> Mixture<T, N, L, K
     /// Removes all hypotheses, and sets the room for new ones.
     pub(crate) fn clear(&mut self, room: usize) {
         (self.len, self.room, self.pause) = (0, room.min(K), Pause::over());
-    }
-
-    /// Restores the parts of a stored state besides its hypotheses.
-    #[cfg(feature = "serde")]
-    pub(crate) fn restore(&mut self, room: usize, pause: Pause<T>) {
-        (self.room, self.pause) = (room, pause);
     }
 
     /// Returns the maximum number of hypotheses that steps keep.

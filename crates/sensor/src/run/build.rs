@@ -4,11 +4,9 @@ use ohmstrain_ekf::live::{
     DoubtParts, LiveParts, Protections, RestBounds, SensorEstimator, Sieve, StaticCurve, Unread,
 };
 use ohmstrain_ekf::{
-    AnyCurve, Compact, Dwell, Evidence, Hypotheses, Imm, Settling, SigmaPoints, SignSplit, SparseEkf, State,
+    AnyCurve, Compact, Dwell, Evidence, Hypotheses, Imm, PlainState, Settling, SigmaPoints, SignSplit, SparseEkf, State,
 };
 use ohmstrain_model::{StrainRange, SwitchedModel};
-use serde::Serialize;
-use serde::de::DeserializeOwned;
 
 use crate::params::SensorParams;
 use crate::params::estimator::{EstimatorKind, EstimatorParams, NoParameters};
@@ -210,7 +208,7 @@ impl<const B: usize, const N: usize> With<B, N> {
     fn run<E, const L: usize>(self, estimator: E) -> Box<dyn Both>
     where
         E: SensorEstimator<f64, N, L, Prepared: Send> + Send + 'static,
-        E::State: State<f64, N, L> + Serialize + DeserializeOwned + Send,
+        E::State: State<f64, N, L> + PlainState<f64> + Send,
     {
         let estimator = Remembering::new(estimator, self.step_factor);
         Box::new(Running::new(estimator, self.parts, self.reports, self.learned, &self.options))

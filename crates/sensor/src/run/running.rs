@@ -6,10 +6,8 @@ use ohmstrain_ekf::correction::{FILTER_INPUTS, mixture};
 use ohmstrain_ekf::live::{
     Correct, Doubts, Flags, LiveFilter, LiveParts, LiveRow, Measured, SensorEstimator, StaticCurve,
 };
-use ohmstrain_ekf::{Estimate, Estimator, Gaussian, PastStep, Reading, Settling, State, StepError};
+use ohmstrain_ekf::{Estimate, Estimator, Gaussian, PastStep, PlainState, Reading, Settling, State, StepError};
 use ohmstrain_model::{StrainRange, SwitchedModel};
-use serde::Serialize;
-use serde::de::DeserializeOwned;
 
 use crate::run::backward::{Backward, KeptStep};
 use crate::run::clock::{Clock, floored};
@@ -17,7 +15,7 @@ use crate::run::learned::{Learned, OfFilter};
 use crate::run::options::Options;
 use crate::run::pending::{LiveStep, Pending, Reported};
 use crate::run::remembering::Remembering;
-use crate::run::stored::{Stored, Waiting};
+use crate::run::stored::{Numbers, Stored, Waiting};
 use crate::run::turns::Turns;
 use crate::run::{Filter, Output};
 
@@ -224,7 +222,7 @@ where
 
 impl<E, const B: usize, const N: usize, const L: usize> Filter for Running<E, B, N, L>
 where
-    E: SensorEstimator<f64, N, L, State: Send + Serialize + DeserializeOwned, Prepared: Send> + Send,
+    E: SensorEstimator<f64, N, L, State: Send + PlainState<f64>, Prepared: Send> + Send,
 {
     fn rest(&mut self, measured: f64) -> Result<(), StepError> {
         self.live.rest(measured)
@@ -285,19 +283,20 @@ where
     }
 
     fn store(&self) -> Result<toml::Table, toml::ser::Error> {
-        let last = self.last.as_ref().map(|row| row.clone().try_map(toml::Value::try_from));
+        let numbers = |state| Ok::<_, toml::ser::Error>(Numbers::of(&state));
+        let last = self.last.as_ref().map(|row| row.clone().try_map(numbers));
         toml::Table::try_from(Stored {
             clock: self.clock,
-            memory: self.live.memory().try_map(toml::Value::try_from)?,
+            memory: self.live.memory().try_map(numbers)?,
             last: last.transpose()?,
-            waiting: self.pending.iter().map(Waiting::of).collect::<Result<_, _>>()?,
+            waiting: self.pending.iter().map(Waiting::of).collect(),
         })
     }
 
     fn resume(&mut self, stored: toml::Table) -> Result<(), toml::de::Error> {
         let Stored { clock, memory, last, waiting } = stored.try_into()?;
-        let memory = memory.try_map(toml::Value::try_into)?;
-        let last = last.map(|row| row.try_map(toml::Value::try_into)).transpose()?;
+        let memory = memory.try_map(Numbers::state)?;
+        let last = last.map(|row| row.try_map(Numbers::state)).transpose()?;
         let waiting = waiting.into_iter().map(|row| row.pending(self.live.substeps()));
         self.pending = waiting.collect::<Result<_, _>>()?;
         self.live.return_to(&memory);
