@@ -25,9 +25,9 @@
 //! WebAssembly with vectors. `adskalman` passes linearised steps to that crate. All features are off by default. The following
 //! work without std:
 //! - `serde`: [`Belief`], [`Estimate`], [`Gaussian`], readings, innovations, verdicts of readings and errors as plain data;
-//!   and [`live::Memory`], the whole state of a running filter, whose estimator's state becomes numbers ([`PlainState`]). A
-//!   deserialised belief is not checked; a step that is impossible from it is rejected. Types whose constructors validate are
-//!   left out.
+//!   and [`live::Memory`], the whole state of a running filter. A mixture in it is first made a list of numbers, by
+//!   [`live::Memory::try_map`] and [`PlainState`]. A deserialised belief is not checked; a step that is impossible from it is
+//!   rejected. Types whose constructors validate are left out.
 //! - `defmt`: `Format` for beliefs and related types, but not for mixtures. The target sends only numbers, no text.
 //!
 //! ```

@@ -44,6 +44,10 @@ pub const LONGEST_PAUSE_S: f64 = 1_048_576.0;
 /// rows without a reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(try_from = "UncheckedPause<T>", bound(deserialize = "T: Scalar + serde::Deserialize<'de>"))
+)]
 pub struct Pause<T> {
     /// Longest length L, s.
     longest_s: T,
@@ -51,6 +55,31 @@ pub struct Pause<T> {
     passed: T,
     /// Time since then, s.
     ahead_s: T,
+}
+
+/// A [`Pause`] as it was stored.
+#[cfg(feature = "serde")]
+#[derive(serde::Deserialize)]
+struct UncheckedPause<T> {
+    longest_s: T,
+    passed: T,
+    ahead_s: T,
+}
+
+#[cfg(feature = "serde")]
+impl<T: Scalar> TryFrom<UncheckedPause<T>> for Pause<T> {
+    type Error = &'static str;
+
+    /// Refuses times that no number of steps covers.
+    fn try_from(stored: UncheckedPause<T>) -> Result<Self, &'static str> {
+        let UncheckedPause { longest_s, passed, ahead_s } = stored;
+        let is_time = |time: T| time >= T::zero() && time.is_finite();
+        if longest_s > T::zero() && is_time(passed) && is_time(ahead_s) {
+            Ok(Self { longest_s, passed, ahead_s })
+        } else {
+            Err("expected the times of a pause")
+        }
+    }
 }
 
 /// True if a pause takes one step.

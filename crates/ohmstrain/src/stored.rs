@@ -253,7 +253,11 @@ impl Stored {
         let refused = |error| StoredError::Text(Box::new(error));
         let Version { format, made_by, .. } = toml::from_str(text).map_err(refused)?;
         if format != FORMAT || made_by != MADE_BY {
-            return Err(StoredError::Version { expected: MADE_BY.to_owned(), found: made_by }.into());
+            // Between two versions, only the format may differ.
+            let named = |maker: &str, of: u32| format!("{maker}, format {of}");
+            return Err(
+                StoredError::Version { expected: named(MADE_BY, FORMAT), found: named(&made_by, format) }.into()
+            );
         }
         Ok(toml::from_str(text).map_err(refused)?)
     }

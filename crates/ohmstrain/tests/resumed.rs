@@ -129,6 +129,12 @@ fn a_state_of_something_else_is_refused() {
         let error = Stored::from_toml(&wrong).unwrap_err().to_string();
         assert!(error.contains(expected), "{error}");
     }
+    // The times of a pause that never ends.
+    for (time, endless) in [("passed = 0.0", "passed = inf"), ("ahead_s = 0.0", "ahead_s = nan")] {
+        assert!(text.contains(time));
+        let damaged = Stored::from_toml(&text.replace(time, endless)).unwrap();
+        assert!(matches!(refused(sensor.filter().resume(&damaged).unwrap_err()), StoredError::Content(_)), "{endless}");
+    }
     // Of another estimator's numbers.
     let ekf = sensor.filter().estimator(EstimatorKind::Ekf).build().unwrap().store().unwrap().to_toml().unwrap();
     let swapped = Stored::from_toml(&ekf.replace("estimator = \"ekf\"", "estimator = \"sign-split\"")).unwrap();

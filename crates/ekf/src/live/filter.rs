@@ -43,6 +43,10 @@ pub struct LiveEstimate<T> {
 /// A row: its estimate, and additional data for a smoother or a fixed lag.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(deserialize = "T: Real + serde::Deserialize<'de>, S: serde::Deserialize<'de>"))
+)]
 pub struct LiveRow<T, S> {
     /// The estimate.
     pub estimate: LiveEstimate<T>,
@@ -136,6 +140,10 @@ pub struct LiveFilter<T: Real, E: SensorEstimator<T, N, L>, C, const N: usize, c
 /// State of a [`LiveFilter`] between steps.
 #[derive(Clone, Copy)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(deserialize = "T: Real + serde::Deserialize<'de>, S: serde::Deserialize<'de>"))
+)]
 pub struct Memory<T, S> {
     /// State at the last used reading, or after whole steps of the pause that follows; `pause` is the time since then.
     state: S,
