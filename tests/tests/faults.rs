@@ -40,15 +40,32 @@ fn a_fault_that_ends_is_over() {
     assert!(recovered.iter().sum::<f64>() >= 95.0 * names.len() as f64, "{recovered:?}");
 }
 
-/// Without a second look, the filter recovers within five seconds in at most 75 % of these cases.
+/// Without a second look, the filter recovers within five seconds in at most 75 % of these cases. One case of twelve is 8 %: they
+/// count together.
 #[test]
 fn a_filter_that_was_led_astray_recovers_by_a_second_look() {
     let (sensor, traces) = (Sensor::from_toml(SENSOR).unwrap(), recordings().unwrap());
     let default = of_library(&sensor, EstimatorKind::Corrected);
-    for name in ["step in baseline, 50 % of R₀, 10 s", "gain × 1.5, 20 s", "R₀ × 1.2, 20 s"] {
-        let response = answer_to(&default, case(name), &traces);
+    let names = ["step in baseline, 50 % of R₀, 10 s", "gain × 1.5, 20 s", "R₀ × 1.2, 20 s"];
+    let responses = names.map(|name| answer_to(&default, case(name), &traces));
+    let recovered = responses.iter().map(|response| response.recovered()).sum::<f64>();
+    assert!(recovered >= 90.0 * names.len() as f64, "{responses:?}");
+    // Without the way back to the state before the fault, 8.6, 7.1 and 7.4 %FS.
+    assert!(responses.iter().all(|response| response.soon.rmse() < 7.1), "{responses:?}");
+}
+
+/// Where readings jump back, the filter continues from its state before the fault. Without that, the extended Kalman filter
+/// recovers within five seconds in 50, 58 and 75 % of these cases, and the default in 42 % of the first.
+#[test]
+fn a_fault_that_ends_with_a_jump_counts_as_missing_readings() {
+    let (sensor, traces) = (Sensor::from_toml(SENSOR).unwrap(), recordings().unwrap());
+    let (ekf, default) = (of_library(&sensor, EstimatorKind::Ekf), of_library(&sensor, EstimatorKind::Corrected));
+    for name in ["polarity flipped, 10 s", "step in baseline, 50 % of R₀, 10 s", "gain × 1.5, 20 s"] {
+        let response = answer_to(&ekf, case(name), &traces);
         assert!(response.recovered() >= 90.0, "{name}: {response:?}");
     }
+    let response = answer_to(&default, case("polarity flipped, 10 s"), &traces);
+    assert!(response.recovered() >= 80.0, "{response:?}");
 }
 
 /// The filter flags nearly all of its wrong rows. Without doubts 85 and 69 % of the rows are wrong without a flag.

@@ -1,7 +1,10 @@
 //! A filter with all that stands around it, in single precision, as a microcontroller runs it.
 
+use std::ops::Range;
+
 use ohmstrain_ekf::live::{
-    DoubtParts, FARTHEST_REST, Learned, LiveFilter, LiveParts, RestBounds, Sieve, StaticCurve, Unread,
+    DoubtParts, FARTHEST_REST, Flag, Learned, LiveFilter, LiveParts, Protections, RestBounds, Sieve, StaticCurve,
+    Unread,
 };
 use ohmstrain_ekf::{Compact, Evidence, Gaussian, SignSplit, SparseEkf, StepError};
 use ohmstrain_model::{Branch, Gauge, ModelNoise, Motion, SensorLaw, StrainRange, SwitchedModel};
@@ -27,7 +30,10 @@ fn filter() -> Filter {
     let motion = Motion::ornstein_uhlenbeck(1.0, 0.1, 0.15, 0.1).unwrap();
     let noise = ModelNoise { reading_sd: 2e-3, branch_sd: 5e-3, baseline_sd: 0.02, baseline_time_s: 30.0 };
     let kernel = SparseEkf::new(SwitchedModel::new(law, motion, noise).unwrap(), DT_S).unwrap();
-    let estimator = SignSplit::around(kernel, None, Evidence { limits: LIMITS, tempering: 1.0 });
+    LiveFilter::new(SignSplit::around(kernel, None, Evidence { limits: LIMITS, tempering: 1.0 }), parts())
+}
+
+fn parts() -> LiveParts<f32, Learned<'static, f32>> {
     let unread = Unread::new(1.0, 0.1, LIMITS);
     let doubt = DoubtParts {
         low: 0.0,
@@ -42,7 +48,7 @@ fn filter() -> Filter {
         rest: None,
         turns: None,
     };
-    let parts = LiveParts {
+    LiveParts {
         rest_reading: REST_READING,
         rested: RESTED,
         dt_s: DT_S,
@@ -55,8 +61,7 @@ fn filter() -> Filter {
         doubt,
         rest: RestBounds { low: None, high: None, start: None },
         learned: None,
-    };
-    LiveFilter::new(estimator, parts)
+    }
 }
 
 #[test]
@@ -104,6 +109,38 @@ fn any_pause_is_passed() {
     for (dt_s, error) in [(f32::INFINITY, StepError::NonFiniteTimeStep), (-1.0, StepError::NegativeTimeStep)] {
         assert_eq!(filter().step_after(dt_s, None), Err(error));
     }
+}
+
+/// A contact is loose for three seconds. The filter then gives the strain of one that had no reading since a time in the half second
+/// before.
+#[test]
+fn readings_between_two_jumps_count_as_missing() {
+    let sieve = Sieve { jump: 0.1, plausible: (-0.5, 3.0), ..Sieve::open() };
+    let filter = || -> Filter { LiveFilter::new(*filter().estimator(), LiveParts { sieve, ..parts() }) };
+    let reading = |row: u16| REST_READING * (1.2 + 0.1 * (0.01 * f32::from(row)).sin());
+    let take = |filter: &mut Filter, rows: Range<u16>, more: f32| {
+        for row in rows {
+            filter.step(reading(row) + more).unwrap();
+        }
+    };
+    let strain_without = |rows: u16| {
+        let (mut filter, passed_s) = (filter(), DT_S * f32::from(501 - rows));
+        take(&mut filter, 0..rows, 0.0);
+        filter.step_after(passed_s, Some(filter.relative(reading(500), 0.0))).unwrap().strain.mean
+    };
+    let strain_after = |mut filter: Filter| {
+        take(&mut filter, 0..200, 0.0);
+        take(&mut filter, 200..500, REST_READING);
+        filter.step(reading(500)).unwrap()
+    };
+    let nearest = |strain: f32| {
+        let apart = (150..=200).map(|rows| (strain_without(rows) - strain).abs());
+        apart.fold(f32::INFINITY, f32::min)
+    };
+    let after = strain_after(filter());
+    assert!(nearest(after.strain.mean) < 1e-6 && after.flags.has(Flag::Recovering));
+    let steady = Protections { second_look: false, ..Protections::ALL };
+    assert!(nearest(strain_after(filter().protected_by(steady)).strain.mean) > 0.01);
 }
 
 /// A curve gives the strain of a reading. Where one is missing, or may be a spike, the filter's strain stands.

@@ -189,8 +189,8 @@ impl<'a> FilterBuilder<'a> {
         Self { protections: Protections { plausibility: false, ..self.protections }, ..self }
     }
 
-    /// Turns off the second look after a jump of the readings, a second hypothesis that starts from the prior. A smoother never
-    /// has one.
+    /// Turns off the second look after a jump of the readings, a second hypothesis that starts from the prior, and the way back to
+    /// the state before a jump if readings jump back. A smoother never has them.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;

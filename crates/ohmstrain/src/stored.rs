@@ -12,7 +12,7 @@ use thiserror::Error;
 use crate::{Error, MADE_BY, QuietSeen, Reading, ValiditySeen};
 
 /// Version of the state file's format.
-const FORMAT: u32 = 3;
+const FORMAT: u32 = 4;
 
 /// A running filter between two rows: the content of a state file. [`Filter::store`](crate::Filter::store) makes it.
 ///
@@ -270,7 +270,7 @@ impl Stored {
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
     /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
-    /// assert!(sensor.filter().build()?.store()?.to_toml()?.starts_with("format = 3"));
+    /// assert!(sensor.filter().build()?.store()?.to_toml()?.starts_with("format = 4"));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn to_toml(&self) -> Result<String, Error> {

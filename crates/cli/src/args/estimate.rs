@@ -60,8 +60,8 @@ pub enum Without {
     Correction,
     /// Turning down readings that are far from those of the calibration, or come again and again
     Plausibility,
-    /// The second look after a jump of the readings, which also follows the knowledge from before any reading
-    /// (smoothers never do)
+    /// The second look after a jump of the readings, which also follows the knowledge from before any reading,
+    /// and the way back to the state before a jump if readings jump back (smoothers never do)
     SecondLook,
     /// Wider intervals at a start, after a fault, and outside of the calibration
     Doubts,

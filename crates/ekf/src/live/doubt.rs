@@ -237,6 +237,11 @@ impl<T: Recordable> Doubts<T> {
         self.misfit.innovations.birge()
     }
 
+    /// Returns the relative deviation of R₀ that readings at rest show, 0 without evidence of one.
+    pub fn rest_off(&self) -> T {
+        self.rest.map_or(T::zero(), |rest| rest.off())
+    }
+
     /// Clears the doubts about the strain, which is now known.
     pub fn settle(&mut self) {
         (self.fading, self.starts, self.unread_s, self.refused) = (T::zero(), false, T::zero(), false);
@@ -374,7 +379,7 @@ impl<T: Recordable> Doubts<T> {
         let times = if is_fast { of_innovations * (faster * faster) } else { of_innovations };
         let stated = (variance * times).min(most).max(variance);
         let outside = self.misfit.outside(&self.parts);
-        let rest_off = self.rest.map_or(T::zero(), |rest| rest.off());
+        let rest_off = self.rest_off();
         let elsewhere = rest_off * per_reading;
         let rests = self.rest.is_some_and(|rest| rest.near_s > T::zero());
         let doubted = self.turns.map_or(T::zero(), |turns| turns.doubted());

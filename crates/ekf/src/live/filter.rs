@@ -1,15 +1,15 @@
 use ohmstrain_model::{MOTION_STATES, StrainRange};
 
+use super::memory::{Memory, Moment};
 use super::{
-    BESIDE_SHARE, Correct, DOUBT, Doubts, FARTHEST_REST, Flags, Jumps, LiveParts, Protections, Repeats, RestFollower,
+    BESIDE_SHARE, Correct, DOUBT, Doubts, FARTHEST_REST, FaultWatch, Flags, LiveParts, Protections, RestFollower,
     SURPRISING_NIS, SensorEstimator, Sieve, StaticCurve,
 };
 use crate::clock::check_time_step;
-use crate::correction::{ReadingFeatures, filter_inputs};
+use crate::correction::filter_inputs;
 use crate::substeps::{LONGEST_PAUSE_S, Pause, Repeated};
 use crate::{
-    Belief, Gaussian, Guard, Influence, PastStep, Reading, ReadingVerdict, Real, Recordable, State, StepError, Streak,
-    Substeps,
+    Belief, Gaussian, Guard, Influence, PastStep, Reading, ReadingVerdict, Real, Recordable, State, StepError, Substeps,
 };
 
 /// Tolerance beyond the limits for a known strain, in spans.
@@ -134,42 +134,9 @@ pub struct LiveFilter<T: Real, E: SensorEstimator<T, N, L>, C, const N: usize, c
     fresh: E::State,
     /// The prepared steps of a pause.
     prepared: (Pause<T>, Repeated<E::Prepared, T>),
-    now: Memory<T, E::State>,
-}
-
-/// State of a [`LiveFilter`] between steps.
-#[derive(Clone, Copy)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(deserialize = "T: Real + serde::Deserialize<'de>, S: serde::Deserialize<'de>"))
-)]
-pub struct Memory<T, S> {
-    /// State at the last used reading, or after whole steps of the pause that follows; `pause` is the time since then.
-    state: S,
-    pause: Pause<T>,
-    streak: Streak,
-    repeats: Repeats<T>,
-    jumps: Jumps<T>,
-    /// Features of the readings, if there is a correction.
-    watched: Option<ReadingFeatures<T>>,
-    /// The filter's variance at the last reading included in the features.
-    known_variance: T,
-    doubts: Doubts<T>,
-    /// Follower of R₀; `None` if R₀ is given, or following is off.
-    follower: Option<RestFollower<T>>,
-}
-
-impl<T, S> Memory<T, S> {
-    /// Converts the state.
-    ///
-    /// # Errors
-    /// The error of the conversion.
-    pub fn try_map<R, E>(self, convert: impl FnOnce(S) -> Result<R, E>) -> Result<Memory<T, R>, E> {
-        let Self { state, pause, streak, repeats, jumps, watched, known_variance, doubts, follower } = self;
-        let state = convert(state)?;
-        Ok(Memory { state, pause, streak, repeats, jumps, watched, known_variance, doubts, follower })
-    }
+    now: Moment<T, E::State>,
+    /// State to continue from if a fault ends ([`FaultWatch`]).
+    kept: Moment<T, E::State>,
 }
 
 impl<T, E, C, const N: usize, const L: usize> LiveFilter<T, E, C, N, L>
@@ -185,9 +152,11 @@ where
         let estimator = Substeps(estimator);
         let pause = at_reading(&estimator, &parts);
         let usual = pause.after(parts.dt_s);
+        let now = Moment::new(&parts, Protections::ALL, (fresh.clone(), pause));
         Self {
             prepared: (usual, estimator.prepare_over(usual)),
-            now: Memory::new(&parts, Protections::ALL, (fresh.clone(), pause)),
+            kept: now.clone(),
+            now,
             rest_reading: parts.rest_reading,
             guard: guard(Protections::ALL),
             protections: Protections::ALL,
@@ -208,8 +177,9 @@ where
     /// Turns off some protections, before any reading.
     #[must_use]
     pub fn protected_by(self, protections: Protections) -> Self {
-        let now = Memory::new(&self.parts, protections, (self.fresh.clone(), at_reading(&self.estimator, &self.parts)));
-        Self { guard: guard(protections), protections, sieve: self.parts.sieve.under(protections), now, ..self }
+        let now = Moment::new(&self.parts, protections, (self.fresh.clone(), at_reading(&self.estimator, &self.parts)));
+        let (guard, sieve, kept) = (guard(protections), self.parts.sieve.under(protections), now.clone());
+        Self { guard, protections, sieve, now, kept, ..self }
     }
 
     /// Sets another guard against outliers.
@@ -228,6 +198,11 @@ where
         &self.now.state
     }
 
+    /// Returns the state and the doubts from which the filter continues after a fault ([`Self::ends_fault`]).
+    pub const fn kept(&self) -> (&E::State, &Doubts<T>) {
+        (&self.kept.state, &self.kept.doubts)
+    }
+
     /// Returns the estimator that divides long steps, for backward steps.
     pub const fn substeps(&self) -> &Substeps<E> {
         &self.estimator
@@ -235,12 +210,12 @@ where
 
     /// Returns the state between steps, for [`Self::return_to`].
     pub fn memory(&self) -> Memory<T, E::State> {
-        self.now.clone()
+        Memory { now: self.now.clone(), kept: self.kept.clone() }
     }
 
     /// Restores a state from [`Self::memory`].
     pub fn return_to(&mut self, memory: &Memory<T, E::State>) {
-        self.now = memory.clone();
+        Memory { now: self.now, kept: self.kept } = memory.clone();
     }
 
     /// True if the strain is corrected.
@@ -261,6 +236,7 @@ where
     /// Clears the doubts about the strain, which is now known.
     pub fn settle(&mut self) {
         self.now.doubts.settle();
+        self.kept.doubts.settle();
     }
 
     /// Advances by the usual time step, with a reading in the unit of the calibration.
@@ -295,6 +271,7 @@ where
         self.rest_reading = self.rest_reading_at(measured)?;
         self.now.follower = None;
         self.now.doubts.restart_rest_watch();
+        self.now.faults = FaultWatch::new();
         Ok(())
     }
 
@@ -314,7 +291,7 @@ where
     pub fn start_at(&mut self, strain: Option<T>) {
         let known = strain.map(|mean| Gaussian { mean, variance: self.parts.known_variance });
         let start = (self.estimator.0.start(known), at_reading(&self.estimator, &self.parts));
-        self.now = Memory::new(&self.parts, self.protections, start);
+        self.now = Moment::new(&self.parts, self.protections, start);
         if let Some(strain) = strain {
             let is_at_rest = strain.abs() <= T::of(DOUBT.zero) * self.parts.limits.span();
             self.now.doubts = self.now.doubts.of_known_strain(is_at_rest);
@@ -341,6 +318,14 @@ where
         self.row_after(dt_s, reading).map(|row| row.estimate)
     }
 
+    /// True if a fault ends with this reading, `dt_s` seconds from now: [`Self::row_after`] then continues from the state before the
+    /// fault, as if the readings in between were missing. If these showed that R₀ is another one, they were no fault.
+    pub fn ends_fault(&self, dt_s: T, reading: Option<Reading<T>>) -> bool {
+        let rest_off = |moment: &Moment<T, E::State>| moment.doubts.rest_off();
+        rest_off(&self.now) == rest_off(&self.kept)
+            && reading.is_some_and(|reading| self.now.faults.is_over(dt_s, reading.value, &self.sieve))
+    }
+
     /// Takes a row, and returns all of its results.
     ///
     /// # Errors
@@ -348,6 +333,20 @@ where
     #[inline]
     pub fn row_after(&mut self, dt_s: T, reading: Option<Reading<T>>) -> Result<LiveRow<T, E::State>, StepError> {
         check_time_step(dt_s)?;
+        let (mut passed_s, mut faulty) = (dt_s, None);
+        if self.ends_fault(dt_s, reading) {
+            passed_s += self.now.faults.kept_s;
+            faulty = Some(core::mem::replace(&mut self.now, self.kept.clone()));
+            self.now.doubts.refuse();
+        }
+        let row = self.row_of(passed_s, reading);
+        if let (Err(_), Some(faulty)) = (&row, faulty) {
+            self.now = faulty;
+        }
+        row
+    }
+
+    fn row_of(&mut self, dt_s: T, reading: Option<Reading<T>>) -> Result<LiveRow<T, E::State>, StepError> {
         // The square of a much longer time would overflow in single precision.
         let dt_s = if self.now.doubts.runs() { dt_s.min(T::of(LONGEST_PAUSE_S)) } else { T::zero() };
         let (measured, look, pause) = self.take(dt_s, reading)?;
@@ -361,8 +360,14 @@ where
         // The estimator's surprise says nothing about a curve.
         let nis = measured.nis.filter(|_| on_curve.is_none()).unwrap_or(T::zero());
         let taken = reading.filter(|_| measured.used.is_some()).map(|reading| (reading.value, nis));
-        if let (Some(follower), Some((reading, _))) = (&mut now.follower, taken) {
-            measured.jumped.into_iter().for_each(|jump| follower.jumped(jump));
+        now.faults.pass(dt_s);
+        let within = |reading| now.follower.is_none_or(|follower| follower.is_within(reading));
+        if let Some((reading, _)) = taken {
+            now.faults.see(reading, measured.jumped, within(reading), self.sieve.jump);
+        } else if measured.verdict == ReadingVerdict::Implausible {
+            now.faults.see_implausible(now.faults.last.is_some_and(within));
+        }
+        if let (Some(follower), Some((reading, _)), false) = (&mut now.follower, taken, now.faults.is_fault()) {
             follower.see(now.doubts.unread_s + dt_s, reading);
         }
         let of_session = |reading| now.follower.map_or(reading, |follower| follower.of_session(reading));
@@ -374,6 +379,9 @@ where
         let (widened, doubts) = now.doubts.widened(Gaussian { variance: open, ..stated }, moments.mean[1]);
         let (variance, doubts) =
             if self.protections.doubts { (widened, doubts) } else { (stated.variance, Flags::NONE) };
+        if measured.verdict == ReadingVerdict::Accepted && now.faults.is_due() {
+            self.kept = now.clone();
+        }
         let strain = Gaussian { variance, ..stated };
         let flags = Flags::of(measured.verdict).and(doubts);
         let estimate = LiveEstimate { strain, rate: Gaussian::marginal(&moments, 1), flags };
@@ -491,7 +499,7 @@ where
 {
     fn clone(&self) -> Self {
         let (estimator, fresh, now) = (self.estimator.clone(), self.fresh.clone(), self.now.clone());
-        Self { estimator, fresh, now, parts: self.parts.clone(), ..*self }
+        Self { estimator, fresh, now, kept: self.kept.clone(), parts: self.parts.clone(), ..*self }
     }
 }
 
@@ -501,23 +509,6 @@ where
     E: SensorEstimator<T, N, L, State: Copy> + Copy,
     C: Copy,
 {
-}
-
-impl<T: Real, S> Memory<T, S> {
-    fn new<C>(parts: &LiveParts<T, C>, protections: Protections, (state, pause): (S, Pause<T>)) -> Self {
-        let doubts = Doubts::new(parts.doubt);
-        Self {
-            state,
-            pause,
-            streak: Streak::default(),
-            repeats: Repeats::none(),
-            jumps: Jumps::none(),
-            watched: parts.learned.as_ref().map(|(scale, _)| ReadingFeatures::new(*scale)),
-            known_variance: T::zero(),
-            doubts: if parts.learned.is_some() { doubts.of_corrected() } else { doubts },
-            follower: protections.following.then(|| RestFollower::new(parts.rest)),
-        }
-    }
 }
 
 /// Returns a filter's strain as reported: clamped to the limits, with its standard deviation times a factor, and its

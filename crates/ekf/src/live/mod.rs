@@ -4,11 +4,13 @@
 
 mod doubt;
 mod estimator;
+mod fault_watch;
 mod filter;
 mod flags;
 mod innovations;
 mod jumps;
 mod learned;
+mod memory;
 mod parts;
 mod protections;
 mod rest_follow;
@@ -20,11 +22,13 @@ mod unread;
 
 pub use doubt::{DOUBT, DoubtNumbers, DoubtParts, Doubts};
 pub use estimator::SensorEstimator;
-pub use filter::{KNOWN_BEYOND, LiveEstimate, LiveFilter, LiveRow, Measured, Memory, may_be_unstretched, reported};
+pub use fault_watch::FaultWatch;
+pub use filter::{KNOWN_BEYOND, LiveEstimate, LiveFilter, LiveRow, Measured, may_be_unstretched, reported};
 pub use flags::{Flag, Flags};
 pub use innovations::Innovations;
 pub use jumps::{BESIDE_SHARE, Jumps, SURPRISING_NIS};
 pub use learned::{Correct, Learned};
+pub use memory::Memory;
 pub use parts::LiveParts;
 pub use protections::Protections;
 pub use rest_follow::{FARTHEST_REST, RestBounds, RestFollower, SessionStart};

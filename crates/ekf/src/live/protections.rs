@@ -5,8 +5,8 @@ pub struct Protections {
     pub plausibility: bool,
     /// Bounded influence: the weight of a reading beyond three standard deviations decreases with its distance.
     pub influence: bool,
-    /// Second look: after a jump of the readings, the filter also follows a hypothesis from its initial distribution; requires
-    /// `influence`.
+    /// Second look: after a jump of the readings, the filter also follows a hypothesis from its initial distribution; if readings
+    /// jump back, it continues from its state before the jump. Requires `influence`.
     pub second_look: bool,
     /// Following: R₀ adapts to readings that stay beyond those of the calibration.
     pub following: bool,

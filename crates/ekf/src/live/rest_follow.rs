@@ -12,8 +12,6 @@ struct Following {
     returns_s: f64,
     /// Longest time that one reading counts for, s, even after a longer gap.
     longest_s: f64,
-    /// Time, s, within which a jump back means that the readings in between were a fault, not a changed R₀.
-    fault_s: f64,
     /// Largest factor between a tracked R₀ and the calibrated one; a reading that would need a larger one is ignored.
     farthest: f64,
 }
@@ -21,7 +19,7 @@ struct Following {
 /// `docs/notes/2026-11-23-following-r0-figures.md` documents their choice. A shorter `leaves_s` follows a changed R₀ sooner,
 /// but also a fault of 10 s farther.
 const FOLLOWING: Following =
-    Following { leaves_s: 40.0, settles_s: 10.0, returns_s: 1.0, longest_s: 2.0, fault_s: 30.0, farthest: 2.0 };
+    Following { leaves_s: 40.0, settles_s: 10.0, returns_s: 1.0, longest_s: 2.0, farthest: 2.0 };
 
 /// Largest factor between a given R₀ and the rested sensor's reading in calibration, either way. Beyond it, the given R₀ has
 /// another unit, or belongs to another sensor.
@@ -99,8 +97,6 @@ pub struct RestFollower<T> {
     /// The last reading, `None` before the first one; `since_s` is the time since then, s.
     pub(crate) last: Option<T>,
     pub(crate) since_s: T,
-    /// Value of `off` at the last jump of the readings, and the time since, s, counted at rows with readings.
-    pub(crate) jumped: Option<[T; 2]>,
 }
 
 impl<T: Recordable> RestFollower<T> {
@@ -112,7 +108,7 @@ impl<T: Recordable> RestFollower<T> {
     /// ```
     #[must_use]
     pub fn new(bounds: RestBounds<T>) -> Self {
-        Self { bounds, off: T::zero(), home: T::zero(), has_begun: false, last: None, since_s: T::zero(), jumped: None }
+        Self { bounds, off: T::zero(), home: T::zero(), has_begun: false, last: None, since_s: T::zero() }
     }
 
     /// Starts a session with a stretched sensor, whose first reading carries no information on R₀.
@@ -189,31 +185,28 @@ impl<T: Recordable> RestFollower<T> {
     /// assert!((follower.off() - 0.2 * 2.0 / 42.0).abs() < 1e-12);
     /// ```
     pub fn see(&mut self, dt_s: T, reading: T) {
-        self.jumped.iter_mut().for_each(|[_, ago_s]| *ago_s += dt_s);
         self.begin(reading);
         self.draw(T::of(FOLLOWING.leaves_s), dt_s, reading);
     }
 
-    /// Takes a jump of the readings. If they had already jumped within 30 s, and this jump is opposite to the change of R₀ since,
-    /// the time in between was a fault, and the earlier R₀ is restored.
+    /// True for a reading, relative to the calibrated R₀, that is within the calibrated range with R₀ as tracked.
     ///
     /// ```
     /// let bounds = ohmstrain_ekf::live::RestBounds { low: Some(-0.05), high: Some(1.5), start: None };
-    /// let mut follower = ohmstrain_ekf::live::RestFollower::<f64>::new(bounds);
-    /// [1.4, 2.0, 2.1].into_iter().for_each(|reading| follower.see(2.0, reading));
-    /// let before = follower.off();
-    /// follower.jumped(0.3);
-    /// [2.4, 2.5].into_iter().for_each(|reading| follower.see(2.0, reading));
-    /// assert!(follower.off() > before && before > 0.0);
-    /// follower.jumped(-0.3);
-    /// assert_eq!(follower.off(), before);
+    /// let follower = ohmstrain_ekf::live::RestFollower::<f64>::new(bounds);
+    /// assert!(follower.is_within(1.4) && !follower.is_within(1.6) && !follower.is_within(-0.1));
     /// ```
-    pub fn jumped(&mut self, jump: T) {
-        match self.jumped.filter(|&[_, ago_s]| ago_s <= T::of(FOLLOWING.fault_s)) {
-            Some([before, _]) if jump * (self.off - before) < T::zero() => self.off = before,
-            Some(_) => {}
-            None => self.jumped = Some([self.off, T::zero()]),
-        }
+    #[must_use]
+    pub fn is_within(&self, reading: T) -> bool {
+        self.wanted(reading).is_none()
+    }
+
+    /// Returns the relative deviation of R₀ that brings a reading beyond the calibrated range to its end; `None` for a reading within
+    /// it.
+    fn wanted(&self, reading: T) -> Option<T> {
+        let wanted = |bound: T| (reading - bound) / (T::one() + bound);
+        let (low, high) = (self.bounds.low.map(wanted), self.bounds.high.map(wanted));
+        high.filter(|&high| high > self.off).or(low.filter(|&low| low < self.off))
     }
 
     /// Takes the first reading of a session.
@@ -232,9 +225,7 @@ impl<T: Recordable> RestFollower<T> {
         }
         let (since_s, longest_s) = (core::mem::replace(&mut self.since_s, T::zero()), T::of(FOLLOWING.longest_s));
         let passed_s = if since_s < longest_s { since_s } else { longest_s };
-        let wanted = |bound: T| (reading - bound) / (T::one() + bound);
-        let (low, high) = (self.bounds.low.map(wanted), self.bounds.high.map(wanted));
-        let Some(wanted) = high.filter(|&high| high > self.off).or(low.filter(|&low| low < self.off)) else { return };
+        let Some(wanted) = self.wanted(reading) else { return };
         if T::of(1.0 / FOLLOWING.farthest - 1.0) < wanted && wanted < T::of(FOLLOWING.farthest - 1.0) {
             let is_leaving = (wanted - self.home).abs() > (self.off - self.home).abs();
             let time_s = if is_leaving { leaves_s } else { T::of(FOLLOWING.returns_s) };

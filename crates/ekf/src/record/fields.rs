@@ -1,5 +1,5 @@
 use crate::correction::ReadingFeatures;
-use crate::live::{Doubts, Jumps, Repeats, RestFollower};
+use crate::live::{Doubts, FaultWatch, Jumps, Repeats, RestFollower};
 
 /// Fields of a state, by name: the numbers that a program in another language keeps from step to step.
 pub trait Fields<T> {
@@ -65,7 +65,13 @@ fields! {
         truth "session_begun" has_begun,
         maybe_one "drawn_by" last,
         number "undrawn_s" since_s,
-        maybe "jumped" jumped,
+    }
+    FaultWatch {
+        maybe_one "used" last,
+        number "moved" moved,
+        number "fault" jump,
+        number "fault_s" began_s,
+        number "kept_s" kept_s,
     }
 }
 

@@ -413,11 +413,6 @@ mod tests {
             follower.see(writer.input("dt_s"), writer.input("rho"));
             writer.keep(follower);
         });
-        let jumps_back = write_down(|writer| {
-            let mut follower = writer.state(RestFollower::new(bounds.to()));
-            follower.jumped(writer.input("jump"));
-            writer.keep(follower);
-        });
         let jumps = write_down(|writer| {
             let mut jumps = writer.state(Jumps::none());
             let jump = jumps.see(writer.input("rho"), writer.input("nis"), writer.input("farthest"));
@@ -430,24 +425,19 @@ mod tests {
             features.step_unless(writer.truth("surprises"), writer.input("dt_s"), reading);
             writer.keep(features);
         });
+        let truth = |truth: bool| f32::from(u8::from(truth));
         let (mut follower, mut jumped, mut features) =
             (RestFollower::<f32>::new(bounds.to()), Jumps::<f32>::none(), ReadingFeatures::<f32>::new(scale.to()));
         for (row, rho, nis) in readings() {
             let (before, before_jump, before_features) = (Seen::of(follower), Seen::of(jumped), Seen::of(features));
             follower.see(0.1, rho);
             assert_same(&done(&follows, &before, &[("dt_s", 0.1), ("rho", rho)])[0], &Seen::of(follower), row);
-            if row % 41 == 0 {
-                let (before, jump) = (Seen::of(follower), if row % 2 == 0 { 0.3 } else { -0.3 });
-                follower.jumped(jump);
-                assert_same(&done(&jumps_back, &before, &[("jump", jump)])[0], &Seen::of(follower), row);
-            }
             let jump = jumped.see(rho, nis, 0.08);
             let [after, given] = done(&jumps, &before_jump, &[("rho", rho), ("nis", nis), ("farthest", 0.08)]);
             assert_same(&after, &Seen::of(jumped), row);
             assert_eq!(given["has_jumped"] == 1.0, jump.is_some(), "row {row}");
             let (is_read, surprises) = (row % 7 != 3, nis > 9.0);
             features.step_unless(surprises, 0.1, is_read.then_some(rho));
-            let truth = |truth: bool| f32::from(u8::from(truth));
             let own = [("is_read", truth(is_read)), ("surprises", truth(surprises)), ("dt_s", 0.1), ("rho", rho)];
             assert_same(&done(&watches, &before_features, &own)[0], &Seen::of(features), row);
         }

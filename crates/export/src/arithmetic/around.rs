@@ -3,7 +3,7 @@
 
 use ohmstrain_ekf::correction::{Decay, FeatureScale, ReadingFeatures, TIME_CONSTANTS_S};
 use ohmstrain_ekf::live::{
-    Doubts, Flag, Jumps, LiveParts, Repeats, RestFollower, SURPRISING_NIS, Sieve, StaticCurve, reported,
+    Doubts, FaultWatch, Flag, Jumps, LiveParts, Repeats, RestFollower, SURPRISING_NIS, Sieve, StaticCurve, reported,
 };
 use ohmstrain_ekf::record::{Expression, Fields, See, Writer};
 use ohmstrain_ekf::{Gaussian, Influence, Reading, ReadingVerdict};
@@ -25,7 +25,7 @@ impl Around<'_> {
     /// Returns all functions, each also as a list if there are lists.
     pub fn text(&self, lists: Option<&mut Lists>) -> String {
         let of_readings = [Self::pass_time(), self.sieve(), startles(), self.coarser(), weighted(), self.reported()];
-        let of_rest = [self.on_followed_rest(), self.of_session(), self.follow(), self.jumped()];
+        let of_rest = [self.on_followed_rest(), self.of_session(), self.follow(), self.is_within()];
         let of_doubts =
             [self.begin(), self.tell_rest(), self.run(), self.doubt_reading(), self.doubt_pause(), self.doubted()];
         let mut all: Vec<_> =
@@ -64,6 +64,7 @@ impl Around<'_> {
         let mut fields = Declared::default();
         Repeats::<Expression<'_>>::none().each(&mut fields);
         Jumps::<Expression<'_>>::none().each(&mut fields);
+        FaultWatch::<Expression<'_>>::new().each(&mut fields);
         self.follower().each(&mut fields);
         self.doubts().each(&mut fields);
         if let Some(correction) = self.parts.correction {
@@ -184,15 +185,14 @@ impl Around<'_> {
         )
     }
 
-    fn jumped(&self) -> Printed {
+    fn is_within(&self) -> Printed {
         Printed::new(
-            "jumped",
-            "Readings have jumped. Where they had shortly before, and back from where they have drawn R0 since, that was a fault.",
-            &["float jump"],
+            "is_within",
+            "Whether a reading is within those of the calibration, with R0 as it is followed.",
+            &["float rho"],
             |writer| {
-                let mut follower = writer.state(self.follower());
-                follower.jumped(writer.input("jump"));
-                writer.keep(follower);
+                let is_within = writer.state(self.follower()).is_within(writer.input("rho"));
+                writer.tell(RETURNED, is_within);
             },
         )
     }

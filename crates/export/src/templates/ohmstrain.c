@@ -63,14 +63,12 @@ enum { DOUBTS = 0 };
 #else
 enum { DOUBTS = 1 };
 #endif
-{% if doubt.turns %}
-/* The flash of an Uno has no room for it. */
+/* The flash of an Uno has no room for {% if doubt.turns %}them{% else %}it{% endif %}. */
 #ifdef __AVR__
-enum { TURNS = 0 };
+enum { WATCHES_FAULTS = 0{% if doubt.turns %}, TURNS = 0{% endif %} };
 #else
-enum { TURNS = 1 };
+enum { WATCHES_FAULTS = 1{% if doubt.turns %}, TURNS = 1{% endif %} };
 #endif
-{% endif %}
 
 #ifdef __AVR__
 /* Its C library has none. What expf rounds off cancels in the quotient (Kahan). */
@@ -247,10 +245,7 @@ enum { SURPRISED = 1 };
 /* ---- The extended Kalman filter -------------------------------------------------------------------------------- */
 
 /* What the filter believes: means, and the lower triangle of their covariance. */
-typedef struct belief {
-    float mean[STATES];
-    float covariance[ENTRIES];
-} belief;
+typedef ohmstrain_belief belief;
 
 static void keep(const ohmstrain_state *state, belief *kept)
 {
@@ -377,12 +372,13 @@ static int step_again(ohmstrain_state *state, const interval *over, const float 
                       ohmstrain_residual *residual)
 {
 {% if estimator.hypotheses %}
-    ohmstrain_state loosened = *state, *from = &loosened;
-{% else %}
-    ohmstrain_state *from = state;
+    belief before;
 {% endif %}
     int status = OHMSTRAIN_ERR_STATE, tries;
 
+{% if estimator.hypotheses %}
+    keep(state, &before);
+{% endif %}
     for (tries = 1; status == OHMSTRAIN_ERR_STATE && tries <= MOST_TRIES; tries++) {
         if (rho) {
             if (!coarser(*rho, extra_variance, &extra_variance)) {
@@ -390,13 +386,13 @@ static int step_again(ohmstrain_state *state, const interval *over, const float 
             }
         }
 {% if estimator.hypotheses %}
-        loosen(from, tries);
+        loosen(state, tries);
 {% endif %}
-        status = attempt(from, over, rho, extra_variance, most, residual);
+        status = attempt(state, over, rho, extra_variance, most, residual);
     }
 {% if estimator.hypotheses %}
-    if (status == OHMSTRAIN_OK) {
-        *state = loosened;
+    if (status != OHMSTRAIN_OK) {
+        restore(state, &before);
     }
 {% endif %}
     return status;
@@ -570,20 +566,131 @@ APART static int look_ahead(ohmstrain_state *state, ohmstrain_pause pause, summa
     return status;
 }
 
+/* ---- Faults that begin and end with a jump of the readings: see the Rust crate `ohmstrain-ekf`, `live::FaultWatch` ------ */
+
+static const float LONGEST_FAULT_S = 30.0f, NEVER_S = 1e9f;
+
+static void no_fault(readings *seen)
+{
+    seen->has_used = 0;
+    seen->moved = 0.0f;
+    seen->fault = 0.0f;
+    seen->fault_s = NEVER_S;
+    seen->kept_s = NEVER_S;
+}
+
+static int is_fault(const readings *seen)
+{
+    return seen->fault_s <= LONGEST_FAULT_S;
+}
+
+/* Whether readings have moved back, by more than `farthest` and a quarter of the jump with which a fault began. */
+static int is_back(const readings *seen, float moved, float farthest)
+{
+    return moved * seen->fault < 0.0f && fabsf(moved) > farthest && fabsf(moved) > 0.25f * fabsf(seen->fault);
+}
+
+/* Takes a row, and its reading if that was used. */
+static void watch_faults(readings *seen, float dt_s, const float *rho, const float *jump, int is_within, float farthest)
+{
+    float moved;
+    int back;
+
+    seen->kept_s += dt_s;
+    seen->fault_s += dt_s;
+    if (!rho) {
+        return;
+    }
+    moved = seen->has_used ? *rho - seen->used : 0.0f;
+    back = is_back(seen, moved, farthest);
+    if (back || (is_within && seen->fault == 0.0f)) {
+        seen->fault = 0.0f;
+        seen->fault_s = NEVER_S;
+    }
+    if (jump && fabsf(seen->moved) > farthest && !is_fault(seen)) {
+        seen->fault = *jump;
+        seen->fault_s = 0.0f;
+    }
+    seen->has_used = 1;
+    seen->used = *rho;
+    seen->moved = back ? 0.0f : moved;
+}
+
+/* Takes an implausible reading. It begins a fault if the reading before was within the calibrated range. */
+static void see_implausible(readings *seen, int was_within)
+{
+    if (was_within && !is_fault(seen)) {
+        seen->fault = 0.0f;
+        seen->fault_s = 0.0f;
+    }
+}
+
+/* Whether a fault of 1 to 30 s ends with a reading: a plausible one, to which readings jump back, and there is a state from no more than
+ * 2 s before. Where they have shown another R0 since, they were no fault. */
+static int ends_fault(const ohmstrain_state *state, float dt_s, float rho, float lower, float upper, float farthest)
+{
+#ifdef __AVR__
+    (void)state, (void)dt_s, (void)rho, (void)lower, (void)upper, (void)farthest;
+    return 0;
+#else
+    const readings *seen = &state->readings;
+    const float lasted_s = seen->fault_s + dt_s;
+
+    return seen->has_used && is_back(seen, rho - seen->used, farthest) && lasted_s >= 1.0f && lasted_s <= LONGEST_FAULT_S &&
+           seen->kept_s - seen->fault_s <= 2.0f && rho >= lower &&
+           rho <= upper{% if doubt.rest %} && seen->rest_off == state->kept.readings.rest_off{% endif %};
+#endif
+}
+
+/* Keeps the state every half second, unless a fault has begun. */
+static void remember(ohmstrain_state *state)
+{
+#ifdef __AVR__
+    (void)state;
+#else
+    if (!is_fault(&state->readings) && state->readings.kept_s >= 0.5f) {
+        state->readings.kept_s = 0.0f;
+        keep(state, &state->kept.belief);
+        state->kept.pause = state->pause;
+        state->kept.readings = state->readings;
+    }
+#endif
+}
+
+/* Goes back to the state before a fault. The reading after it is the next one. */
+static void go_back(ohmstrain_state *state)
+{
+#ifndef __AVR__
+    restore(state, &state->kept.belief);
+    state->pause = state->kept.pause;
+    state->readings = state->kept.readings;
+#endif
+    refuse(&state->readings);
+}
+
 /* A step with a reading, relative, or without. */
 static ohmstrain_status step(ohmstrain_state *state, float dt_s, const float *rho, float extra_variance,
                              ohmstrain_residual *residual)
 {
     static const ohmstrain_pause over = {0.0f, 0.0f};
-    ohmstrain_pause pause = state->pause;
-    readings seen = state->readings;
+    const float farthest = SECOND_LOOK ? JUMP : INFINITY;
+    const float lower = PLAUSIBILITY ? PLAUSIBLE_LOWER : -INFINITY, upper = PLAUSIBILITY ? PLAUSIBLE_UPPER : INFINITY;
+    ohmstrain_pause pause;
+    readings seen;
     unsigned flags = rho ? 0 : OHMSTRAIN_MISSING;
     ohmstrain_residual of_step = {0.0f, 0.0f, 0.0f};
     summary all;
     const float *believed = rho;
     float strain, variance, shown = 0.0f, jump = 0.0f;
-    int surprises, has_jumped;
+    int surprises, has_jumped, is_calm;
 
+    /* Where a fault ends, its readings were none. */
+    if (WATCHES_FAULTS && rho && ends_fault(state, dt_s, *rho, lower, upper, farthest)) {
+        dt_s += state->readings.kept_s;
+        go_back(state);
+    }
+    pause = state->pause;
+    seen = state->readings;
     /* The first row takes no time. Single precision has no square of much more than the longest pause. */
     dt_s = !seen.runs ? 0.0f : dt_s < LONGEST_PAUSE_S ? dt_s : LONGEST_PAUSE_S;
     /* Before the first reading there is nothing to predict from. */
@@ -597,8 +704,8 @@ static ohmstrain_status step(ohmstrain_state *state, float dt_s, const float *rh
         if (seen.follows) {
             on_followed_rest(&seen, *rho, extra_variance, &shown, &extra_variance);
         }
-        flags = sieve(&seen, PLAUSIBILITY ? PLAUSIBLE_LOWER : -INFINITY, PLAUSIBILITY ? PLAUSIBLE_UPPER : INFINITY,
-                      PLAUSIBILITY ? LONGEST_REPEAT_S : INFINITY, shown, extra_variance, &extra_variance);
+        flags = sieve(&seen, lower, upper, PLAUSIBILITY ? LONGEST_REPEAT_S : INFINITY, shown, extra_variance,
+                      &extra_variance);
         rho = flags ? (const float *)0 : &shown;
     }
     if (rho && advance(state, pause, rho, extra_variance, &flags, &of_step) != OHMSTRAIN_OK) {
@@ -616,7 +723,7 @@ static ohmstrain_status step(ohmstrain_state *state, float dt_s, const float *rh
     }
     believed = rho ? believed : rho;
     surprises = (flags & OHMSTRAIN_DOWNWEIGHTED) && of_step.nis > SURPRISING;
-    has_jumped = rho && startles(&seen, *rho, of_step.nis, SECOND_LOOK ? JUMP : INFINITY, &jump) && surprises;
+    has_jumped = rho && startles(&seen, *rho, of_step.nis, farthest, &jump) && surprises;
 {% if estimator.hypotheses %}
     if (has_jumped) {
         look_again(state);
@@ -639,10 +746,14 @@ static ohmstrain_status step(ohmstrain_state *state, float dt_s, const float *rh
         correct(&all, &seen, filtered, filtered_variance, &strain, &variance);
     }
 {% endif %}
-    if (believed && seen.follows) {
-        if (has_jumped) {
-            jumped(&seen, jump);
+    if (WATCHES_FAULTS) {
+        watch_faults(&seen, dt_s, believed, has_jumped ? &jump : (const float *)0,
+                     believed && (!seen.follows || is_within(&seen, *believed)), farthest);
+        if (flags & OHMSTRAIN_IMPLAUSIBLE) {
+            see_implausible(&seen, seen.has_used && (!seen.follows || is_within(&seen, seen.used)));
         }
+    }
+    if (believed && seen.follows && !(WATCHES_FAULTS && is_fault(&seen))) {
         follow(&seen, seen.unread_s + dt_s, *believed);
     }
     state->strain = strain;
@@ -667,8 +778,12 @@ static ohmstrain_status step(ohmstrain_state *state, float dt_s, const float *rh
     if (DOUBTS) {
         flags |= doubted(&seen, strain, all.mean[1], variance, &state->variance);
     }
+    is_calm = believed && !(flags & OHMSTRAIN_DOWNWEIGHTED);
     seen.flags = flags;
     state->readings = seen;
+    if (WATCHES_FAULTS && is_calm) {
+        remember(state);
+    }
     return OHMSTRAIN_OK;
 }
 
@@ -682,6 +797,9 @@ static ohmstrain_status start(ohmstrain_state *state, const float *strain, float
     state->pause.ahead_s = 0.0f;
     memset(&state->readings, 0, sizeof state->readings);
     state->readings.follows = FOLLOWING;
+    if (WATCHES_FAULTS) {
+        no_fault(&state->readings);
+    }
     begin(&state->readings, strain != 0, strain && fabsf(*strain) <= << doubt.zero >>f);
     /* The first reading of a session that begins stretched tells nothing of R0. */
     state->readings.session_begun = strain && !(fabsf(*strain) <= << doubt.zero >>f);
@@ -758,6 +876,9 @@ ohmstrain_status ohmstrain_rest(ohmstrain_state *state, float measured)
     state->readings.follows = 0;
     state->readings.off = 0.0f;
     tell_rest(&state->readings);
+    if (WATCHES_FAULTS) {
+        no_fault(&state->readings);
+    }
     return OHMSTRAIN_OK;
 }
 

@@ -16,7 +16,8 @@
  * - It is protected from what no calibration has seen. To turn a protection off compile ohmstrain.c with -D and one of
  *   OHMSTRAIN_WITHOUT_PLAUSIBILITY (readings that this sensor cannot give, or that are stuck, are none),
  *   OHMSTRAIN_WITHOUT_INFLUENCE (what surprises counts less),
- *   OHMSTRAIN_WITHOUT_SECOND_LOOK (where readings jump, what was known before any reading is followed, too),
+ *   OHMSTRAIN_WITHOUT_SECOND_LOOK (where readings jump, what was known before any reading is followed, too; where they jump back,
+ *   those in between were none{% if lists %}, but not on an AVR{% endif %}),
  *   OHMSTRAIN_WITHOUT_FOLLOWING (R0 follows readings that stay beyond the calibration's),
  *   OHMSTRAIN_WITHOUT_DOUBTS (intervals are wider where there is something to doubt).
  * - Functions return 0 or a negative error code. After an error the caller's state is as it was before.
@@ -132,11 +133,30 @@ typedef struct ohmstrain_mixture {
 } ohmstrain_mixture;
 
 {% endif %}
+{% if not estimator.hypotheses %}
+/* A Gaussian. */
+typedef struct ohmstrain_belief {
+    float mean[OHMSTRAIN_STATES];
+    float covariance[OHMSTRAIN_ENTRIES];
+} ohmstrain_belief;
+
+{% endif %}
 /* The time since the last reading that was used. */
 typedef struct ohmstrain_pause {
     float passed;  /* in whole steps, which the filter has taken: in the longest step */
     float ahead_s; /* since then */
 } ohmstrain_pause;
+
+/* What the filter goes on from when a fault of the readings ends: its state before that. */
+typedef struct ohmstrain_kept {
+{% if estimator.hypotheses %}
+    ohmstrain_mixture belief;
+{% else %}
+    ohmstrain_belief belief;
+{% endif %}
+    ohmstrain_pause pause;
+    ohmstrain_readings readings;
+} ohmstrain_kept;
 
 /* What the filter knows; the caller owns it, one per sensor. Only a reading moves it on: intervals without one look ahead. */
 typedef struct ohmstrain_state {
@@ -150,6 +170,9 @@ typedef struct ohmstrain_state {
 {% endif %}
     ohmstrain_pause pause;
     ohmstrain_readings readings;
+#ifndef __AVR__
+    ohmstrain_kept kept;
+#endif
     /* What is reported: the strain, its rate (1/s), and their variances. */
     float strain;
     float variance;

@@ -134,7 +134,8 @@ where
         time_s: f64,
         reading: Option<Reading<f64>>,
     ) -> Result<KeptRow<E, N, L>, StepError> {
-        let before = self.live.state().clone();
+        let ends_fault = self.ends_fault(time_s, reading);
+        let before = if ends_fault { self.live.kept().0 } else { self.live.state() }.clone();
         let row = self.row(time_s, reading)?;
         let step = match &row.look {
             None => KeptStep::Read(self.live.past_step(&before, &row.measured)),
@@ -145,6 +146,12 @@ where
             }
         };
         Ok((row, step))
+    }
+
+    /// True if a fault ends with this reading.
+    fn ends_fault(&self, time_s: f64, reading: Option<Reading<f64>>) -> bool {
+        let reading = reading.filter(|reading| reading.value.is_finite());
+        self.clock.at(time_s).is_ok_and(|(_, dt_s)| self.live.ends_fault(dt_s, reading))
     }
 
     /// Notes a turn of the readings at the last row.
@@ -259,11 +266,13 @@ where
         lag_s: f64,
         out: &mut dyn FnMut(Output),
     ) -> Result<(), StepError> {
-        // Rows due before the time of this reading are estimated without it.
-        let overdue = self.pending.partition_point(|row| row.time_s + lag_s < time_s);
+        // Rows due before the time of this reading are estimated without it, and all those of a fault that it ends.
+        let ends_fault = self.ends_fault(time_s, reading);
+        let overdue = self.pending.partition_point(|row| ends_fault || row.time_s + lag_s < time_s);
         let now = self.live.state().clone();
         self.emit(overdue, now, out)?;
-        let birge = self.live.doubts().birge();
+        let doubts = if ends_fault { self.live.kept().1 } else { self.live.doubts() };
+        let birge = doubts.birge();
         let (row, step) = self.kept_row(time_s, reading)?;
         let state = self.state_after(&row.measured, &step)?;
         let corrected = self.live.is_corrected().then_some((row.stated, birge));
