@@ -89,7 +89,7 @@ pub struct Measured<T> {
     /// Jump of the readings, if it caused a second look: at the second reading in a row beyond five standard
     /// deviations, and farther than [`Sieve::jump`] from the last one that did not surprise.
     pub jumped: Option<T>,
-    /// True for the first few startling readings in a row, which may be spikes ([`Jumps::may_be_spike`]).
+    /// True for the first few startling readings in a row, which may be spikes ([`may_be_spike`](super::Jumps::may_be_spike)).
     #[cfg_attr(feature = "serde", serde(default))]
     pub spike: bool,
     /// Factor on the covariance of the state before the step, at a readmission ([`Guard`]).

@@ -17,7 +17,7 @@
  *   OHMSTRAIN_WITHOUT_PLAUSIBILITY (readings that this sensor cannot give, or that are stuck, are none),
  *   OHMSTRAIN_WITHOUT_INFLUENCE (what surprises counts less),
  *   OHMSTRAIN_WITHOUT_SECOND_LOOK (where readings jump, what was known before any reading is followed, too; where they jump back,
- *   those in between were none{% if lists %}, but not on an AVR{% endif %}),
+ *   those in between were none, but not on an AVR),
  *   OHMSTRAIN_WITHOUT_FOLLOWING (R0 follows readings that stay beyond the calibration's),
  *   OHMSTRAIN_WITHOUT_DOUBTS (intervals are wider where there is something to doubt).
  * - Functions return 0 or a negative error code. After an error the caller's state is as it was before.
