@@ -7,7 +7,7 @@ use crate::Recordable;
 const LONGEST_S: f64 = 30.0;
 /// Shortest such time, s. Readings that jump back earlier are noise or spikes.
 const SHORTEST_S: f64 = 1.0;
-/// Time after which the kept state is renewed, s. Copying a state takes about as long as a step of an extended Kalman filter.
+/// Time after which the kept state is renewed, s.
 const RENEWED_S: f64 = 0.5;
 /// Largest age of the kept state at the beginning of a fault, s. It is older where readings surprise for longer.
 const OLDEST_S: f64 = 2.0;
