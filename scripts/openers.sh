@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # Fails where the first sentence of a doc comment begins with a word that hides its subject: CONTRIBUTING.md, "English".
+# So do comments before functions and constants of exported C.
 # scripts/openers.sh [--list] [PATH...]: --list only lists, without failing; the default path is the sources of all crates.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -28,6 +29,9 @@ found=$(find "$@" -name '*.rs' -not -path '*/target/*' -print0 | sort -z | xargs
         }
         before = kind
     }')
+found+=$(find "$@" \( -name '*.c' -o -name '*.h' -o -name '*.ino' \) -not -path '*/target/*' -print0 | sort -z | xargs -0 -r awk -v forbidden="^(/\\*|//) ($forbidden)([^[:alnum:]_]|$)" '
+    $0 ~ forbidden && !(before ~ /^\/\//) { print FILENAME ":" FNR ": " $0 }
+    { before = $0 }')
 if [ -z "$found" ]; then
     exit 0
 fi

@@ -250,6 +250,8 @@ def panel(x, y, points, radius=7):
         named = {DEFAULT: "default", EKF: "EKF", ("lean", ""): "lean"}.get((name, rows))
         if named == "EKF":
             yield text(across - 7, up - 12, named)
+        elif named == "lean":
+            yield text(across - 11, up + 4, named, text_anchor="end")
         elif named:
             yield text(across + 11, up + 4, named)
 

@@ -241,12 +241,12 @@ impl Variant {
     fn check_words(&self, bench: &Bench) {
         let (readme, header) = (bench.read("c/README.md"), bench.read("c/src/ohmstrain.h"));
         let never = self.is("rest", "never");
-        assert_eq!(readme.contains("The sensor never rested in calibration"), never, "{}", self.name());
-        assert_eq!(readme.contains("The rested, unstretched sensor read"), !never, "{}", self.name());
+        assert_eq!(readme.contains("In calibration the sensor never rested"), never, "{}", self.name());
+        assert_eq!(readme.contains("In calibration the rested, unstretched sensor read"), !never, "{}", self.name());
         assert_eq!(header.contains("in calibration it did not rest"), never, "{}", self.name());
         let at_zero = self.is("limits", "from zero");
-        assert_eq!(readme.contains("starts the filter again, at zero"), at_zero, "{}", self.name());
-        assert_eq!(header.contains("the filter starts again, at zero"), at_zero, "{}", self.name());
+        assert_eq!(readme.contains("restarts the filter at zero"), at_zero, "{}", self.name());
+        assert_eq!(header.contains("the filter restarts at zero"), at_zero, "{}", self.name());
     }
 }
 

@@ -119,11 +119,7 @@ impl CorrectionConstants {
             inducing: learned.direct.explained.side(),
             processes: [
                 ProcessConstants::new("DIRECT", "Strain from the features.", &learned.direct),
-                ProcessConstants::new(
-                    "RESIDUAL",
-                    "What the filter's strain lacks, from all inputs.",
-                    &learned.residual,
-                ),
+                ProcessConstants::new("RESIDUAL", "Error of the filter's strain, from all inputs.", &learned.residual),
             ],
             quadratics: quadratics.map(|both| both.each_ref().map(|one| one.map(narrow))),
             simulated: learned.simulated.as_ref().map(SimulatedConstants::new),

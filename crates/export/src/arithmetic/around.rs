@@ -99,7 +99,7 @@ impl Around<'_> {
     fn sieve(&self) -> Printed {
         Printed::new(
             "sieve",
-            "What becomes of a reading, relative: a flag, or 0 where it is to be used, with the extra variance that repetition, and errors\n * that are alike for a while, give it.",
+            "Verdict on a relative reading: a flag, or 0 if it is to be used, with the extra variance due to repetition and correlated errors.",
             &["float lower", "float upper", "float longest_repeat_s", "float rho", "float extra_variance"],
             |writer| {
                 let mut repeats = writer.state(Repeats::none());
@@ -121,7 +121,7 @@ impl Around<'_> {
     fn coarser(&self) -> Printed {
         Printed::new(
             "coarser",
-            "A reading with more noise, where it is more exact than the numbers; whether that is of use.",
+            "Reading with more noise, for one too exact for single precision; false if more noise does not help.",
             &["float rho", "float extra_variance"],
             |writer| {
                 let reading = of_reading(writer);
@@ -135,7 +135,7 @@ impl Around<'_> {
     fn reported(&self) -> Printed {
         Printed::new(
             "reported",
-            "The filter's strain as it is reported.",
+            "Reported strain of the filter, and its variance.",
             &["float mean", "float variance"],
             |writer| {
                 let strain = Gaussian { mean: writer.input("mean"), variance: writer.input("variance") };
@@ -150,7 +150,7 @@ impl Around<'_> {
     fn on_followed_rest(&self) -> Printed {
         Printed::new(
             "on_followed_rest",
-            "A reading relative to R0 as it is followed, from one relative to calibration's.",
+            "Reading relative to the tracked R0, from one relative to that of the calibration.",
             &["float rho", "float extra_variance"],
             |writer| {
                 let shown = writer.state(self.follower()).relative(of_reading(writer));
@@ -163,7 +163,7 @@ impl Around<'_> {
     fn of_session(&self) -> Printed {
         Printed::new(
             "of_session",
-            "A reading relative to R0 as it was when the session began, from one relative to calibration's.",
+            "Reading relative to R0 at the start of the session, from one relative to that of the calibration.",
             &["float rho"],
             |writer| {
                 let of_session = writer.state(self.follower()).of_session(writer.input("rho"));
@@ -175,7 +175,7 @@ impl Around<'_> {
     fn follow(&self) -> Printed {
         Printed::new(
             "follow",
-            "R0 follows the readings: one beyond those of calibration draws it after itself, slowly, and one beyond the other end back, soon.",
+            "Adapts R0 to a reading: slowly to one outside the calibrated range, and soon back to one beyond the other end.",
             &["float dt_s", "float rho"],
             |writer| {
                 let mut follower = writer.state(self.follower());
@@ -188,7 +188,7 @@ impl Around<'_> {
     fn is_within(&self) -> Printed {
         Printed::new(
             "is_within",
-            "Whether a reading is within those of the calibration, with R0 as it is followed.",
+            "True for a reading within the calibrated range, relative to the tracked R0.",
             &["float rho"],
             |writer| {
                 let is_within = writer.state(self.follower()).is_within(writer.input("rho"));
@@ -200,7 +200,7 @@ impl Around<'_> {
     fn begin(&self) -> Printed {
         Printed::new(
             "begin",
-            "Before any reading; where the strain is known, and rests.",
+            "Initial doubts, at a known strain, and at rest, if these are true.",
             &["int is_known", "int is_at_rest"],
             |writer| {
                 let doubts = self.doubts();
@@ -224,7 +224,7 @@ impl Around<'_> {
     fn birge(&self) -> Printed {
         Printed::new(
             "birge_of",
-            "By how much innovations have been larger of late than the filter states them.",
+            "Ratio of the recent innovation variance to the stated one, at least 1.",
             &[],
             |writer| {
                 let birge = writer.state(self.doubts()).birge();
@@ -250,15 +250,10 @@ impl Around<'_> {
     }
 
     fn has_begun(&self) -> Printed {
-        Printed::new(
-            "has_begun",
-            "Whether there has been a reading that was used, or a strain that was known.",
-            &[],
-            |writer| {
-                let has_begun = writer.state(self.doubts()).has_begun();
-                writer.tell(RETURNED, has_begun);
-            },
-        )
+        Printed::new("has_begun", "True after a used reading, or a known strain.", &[], |writer| {
+            let has_begun = writer.state(self.doubts()).has_begun();
+            writer.tell(RETURNED, has_begun);
+        })
     }
 
     fn watch_turns(&self) -> Printed {
@@ -272,7 +267,7 @@ impl Around<'_> {
     fn doubt_reading(&self) -> Printed {
         Printed::new(
             "doubt_reading",
-            "Takes a reading that was used, and its squared innovation in variances.",
+            "Takes a used reading and its normalised innovation squared.",
             &["float rho", "float nis"],
             |writer| {
                 let mut doubts = writer.state(self.doubts());
@@ -285,7 +280,7 @@ impl Around<'_> {
     fn doubt_pause(&self) -> Printed {
         Printed::new(
             "doubt_pause",
-            "Variance of the strain that the time since the last reading leaves open.",
+            "Variance of the strain after the time since the last reading.",
             &["float strain", "float variance"],
             |writer| {
                 let doubts = writer.state(self.doubts());
@@ -298,7 +293,7 @@ impl Around<'_> {
     fn doubted(&self) -> Printed {
         Printed::new(
             "doubted",
-            "The strain's variance with all doubts, and flags that say so.",
+            "Variance of the strain with all doubts, and their flags.",
             &["float strain", "float rate", "float variance"],
             |writer| {
                 let doubts = writer.state(self.doubts());
@@ -325,7 +320,7 @@ const DOUBTS: [(&str, Flag); 5] = [
 fn weighted() -> Printed {
     Printed::new(
         "weighted",
-        "The extra variance of a reading that surprises: it has less weight.",
+        "Extra variance of an outlier, which gives it less weight.",
         &["float extra_variance", "float nis", "float variance"],
         |writer| {
             let weight =
@@ -339,7 +334,7 @@ fn weighted() -> Printed {
 fn startles() -> Printed {
     Printed::new(
         "startles",
-        "Whether readings have jumped, farther than `farthest`, and by how much.",
+        "True if readings have jumped by more than `farthest`, and the jump.",
         &["float rho", "float nis", "float farthest"],
         |writer| {
             let mut jumps = writer.state(Jumps::none());
@@ -353,22 +348,17 @@ fn startles() -> Printed {
 
 /// Records whether the last reading may be a spike.
 fn may_be_spike() -> Printed {
-    Printed::new(
-        "may_be_spike",
-        "Whether the last reading startled, and at most two before it in a row.",
-        &[],
-        |writer| {
-            let jumps = writer.state(Jumps::none());
-            writer.tell(RETURNED, jumps.may_be_spike());
-        },
-    )
+    Printed::new("may_be_spike", "True for the first three startling readings in a row.", &[], |writer| {
+        let jumps = writer.state(Jumps::none());
+        writer.tell(RETURNED, jumps.may_be_spike());
+    })
 }
 
 /// Records the strain of a reading on a curve.
 fn on_curve(curve: &StaticCurve<f64>) -> Printed {
     Printed::new(
         "on_curve",
-        "The strain of a reading, relative, by the static cubic, and its variance.",
+        "Strain of a relative reading by the static cubic, and its variance.",
         &["float rho"],
         |writer| {
             let Gaussian { mean, variance } = curve.to().strain(writer.input("rho"));
@@ -382,7 +372,7 @@ fn on_curve(curve: &StaticCurve<f64>) -> Printed {
 fn watch(scale: &FeatureScale<f64>) -> Printed {
     Printed::new(
         "watch",
-        "Takes a reading, relative, into the low-passes, which forget so much; without one they wait. The first few that surprise are passed\n * over.",
+        "Passes a relative reading to the low-passes, which forget these shares; without one they wait. The first few outliers are left out.",
         &[
             "float dt_s",
             "int is_read",

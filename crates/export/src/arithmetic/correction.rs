@@ -12,31 +12,31 @@ pub fn functions(learned: &OwnedLearned<f32>) -> Vec<Printed> {
     let mut all = vec![
         Printed {
             name: "scale",
-            comment: "An input on a scale, moved into its range, and the square of how far it was outside.",
+            comment: "Standardised input, clamped to its range, and its squared distance from the range.",
             parameters: &["float input", "float mean", "float sd", "float lower", "float upper"],
             function: write_scaled(),
         },
         Printed {
             name: "of_inputs",
-            comment: "The distances of inputs outside of the range of the rows, and what is said before any row.",
+            comment: "Distances of inputs outside the range of the rows, and the means of the processes.",
             parameters: &["const float x[INPUTS]", "const float square[INPUTS]"],
             function: correction.write_inputs(quadratics.as_ref()),
         },
         Printed {
             name: "kernels",
-            comment: "The kernels of inputs with a row.",
+            comment: "Kernels of inputs with a row.",
             parameters: &["const float x[INPUTS]", "const float row[INPUTS]"],
             function: correction.write_kernels(),
         },
         Printed {
             name: "direct",
-            comment: "The strain from the features, of the sum over the rows and what inducing rows explain.",
+            comment: "Strain from the features, given the sum over the rows and the share that inducing rows explain.",
             parameters: &["float sum", "float explained", "float reading", "float outside"],
             function: correction.write_direct(),
         },
         Printed {
             name: "residual",
-            comment: "The filter's strain with what it lacks, and how new the inputs are.",
+            comment: "Filter's strain plus its predicted error, and the novelty of the inputs.",
             parameters: &[
                 "float sum",
                 "float explained",
@@ -49,13 +49,13 @@ pub fn functions(learned: &OwnedLearned<f32>) -> Vec<Printed> {
         },
         Printed {
             name: "mix",
-            comment: "The mixture of two, each weighted by its variance to the power -3/2; an exact one is all that counts.",
+            comment: "Mixture of two estimates with weights of variance^(-3/2); an exact one has all of the weight.",
             parameters: &["float mean_a", "float variance_a", "float mean_b", "float variance_b"],
             function: write_mixture(),
         },
         Printed {
             name: "learned",
-            comment: "The variance of what is mixed, larger by what innovations say, and by how new the inputs are.",
+            comment: "Variance of a member, larger by the ratio of innovations and by the novelty of the inputs.",
             parameters: &["float variance", "float novelty", "float birge"],
             function: correction.write_learned(),
         },
@@ -64,19 +64,19 @@ pub fn functions(learned: &OwnedLearned<f32>) -> Vec<Printed> {
         all.extend([
             Printed {
                 name: "simulated_distance",
-                comment: "The distance of features outside of the range of the simulated rows.",
+                comment: "Distance of features outside the range of the simulated rows.",
                 parameters: &["const float square[FEATURES]"],
                 function: correction.write_simulated_distance(simulated),
             },
             Printed {
                 name: "simulated_kernel",
-                comment: "The kernel of features with a simulated row.",
+                comment: "Kernel of features with a simulated row.",
                 parameters: &["const float x[FEATURES]", "const float row[FEATURES]"],
                 function: correction.write_simulated_kernel(simulated),
             },
             Printed {
                 name: "simulated",
-                comment: "The strain, as the law has it where the sensor was not seen, of the sum over the simulated rows.",
+                comment: "Strain in motions without recordings, by the law, given the sum over the simulated rows.",
                 parameters: &["float sum", "float reading", "float outside"],
                 function: correction.write_simulated(simulated),
             },

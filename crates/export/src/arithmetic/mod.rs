@@ -78,10 +78,14 @@ const SIDE: Function = Function { inputs: &[Input::Number("side")], ..MOVES };
 
 /// A prediction and an update whose direction of motion is left to the rate's distribution.
 const OPEN: [Function; 3] = [
-    Function { name: "predict_open", comment: "One interval on; the direction is as uncertain as the rate.", ..MOVES },
+    Function {
+        name: "predict_open",
+        comment: "Predicts over an interval, with a direction as uncertain as the rate.",
+        ..MOVES
+    },
     Function {
         name: "take_open",
-        comment: "Takes a reading, relative to the rest reading. Returns whether all is sound.",
+        comment: "Updates with a relative reading. Returns true if the result is sound.",
         piece: Piece::Take(None),
         ..TAKES
     },
@@ -90,7 +94,7 @@ const OPEN: [Function; 3] = [
 
 const SOUND: Function = Function {
     name: "is_sound",
-    comment: "Whether nothing is infinite or no number, and no variance negative.",
+    comment: "True if all numbers are finite, and no variance is negative.",
     piece: Piece::Sound,
     returns: Returns::Truth,
     ..MOVES
@@ -99,7 +103,7 @@ const SOUND: Function = Function {
 /// Functions for doubts, hypotheses and corrections.
 const FALLING: Function = Function {
     name: "falling",
-    comment: "e^x of x that is not above zero: 2^n e^r with |r| <= ln(2)/2, and Taylor's series. The same bits everywhere.",
+    comment: "e^x for x <= 0: 2^n e^r with |r| <= ln(2)/2, and Taylor's series. The same bits on every processor.",
     piece: Piece::Falling,
     inputs: &[Input::Number("x")],
     has_state: false,
@@ -111,25 +115,25 @@ const FALLING: Function = Function {
 const PHASES: [Function; 13] = [
     Function {
         name: "predict_extend",
-        comment: "One interval on, stretching.",
+        comment: "Predicts over an interval of stretching.",
         piece: Piece::Predict(Phase::Extend),
         ..MOVES
     },
     Function {
         name: "predict_hold",
-        comment: "One interval on, at rest.",
+        comment: "Predicts over an interval at rest.",
         piece: Piece::Predict(Phase::Hold),
         ..MOVES
     },
     Function {
         name: "predict_retract",
-        comment: "One interval on, releasing.",
+        comment: "Predicts over an interval of releasing.",
         piece: Piece::Predict(Phase::Retract),
         ..MOVES
     },
     Function {
         name: "take_extend",
-        comment: "Takes a reading while stretching. Returns whether all is sound.",
+        comment: "Updates with a reading while stretching. Returns true if the result is sound.",
         piece: Piece::Take(Some(Phase::Extend)),
         ..TAKES
     },
@@ -143,14 +147,14 @@ const PHASES: [Function; 13] = [
     SOUND,
     Function {
         name: "renew_rate",
-        comment: "Draws the rate anew, independent of everything else.",
+        comment: "Replaces the rate by one that is independent of the other states.",
         piece: Piece::Renew,
         inputs: &[Input::Number("rate"), Input::Number("rate_variance")],
         ..MOVES
     },
     Function {
         name: "tail_above",
-        comment: "What a standard normal has above a border; the density at the border over it is its hazard.",
+        comment: "Probability of a standard normal above a border; the density at the border over it is the hazard.",
         piece: Piece::Tail,
         inputs: &[Input::Number("border")],
         outputs: &["hazard"],
@@ -159,7 +163,7 @@ const PHASES: [Function; 13] = [
     },
     Function {
         name: "of_limits",
-        comment: "Probability of the limits over what per_inside is one over, and one over the probability itself.",
+        comment: "Probability of the limits times per_inside, and its new inverse.",
         piece: Piece::OfLimits,
         inputs: &[Input::Number("per_inside"), Input::Number("lower"), Input::Number("upper")],
         outputs: &["more_inside", "per_inside_now"],
@@ -167,7 +171,7 @@ const PHASES: [Function; 13] = [
     },
     Function {
         name: "is_like",
-        comment: "Whether another state says the same of strain and rate.",
+        comment: "True if strain and rate are alike in another state.",
         piece: Piece::Alike,
         inputs: &[Input::State],
         returns: Returns::Truth,
@@ -183,7 +187,7 @@ const PHASES: [Function; 13] = [
     },
     Function {
         name: "merge_states",
-        comment: "Takes another state in, with the mean and covariance of the pair.",
+        comment: "Merges with another state, preserving the mean and covariance of the pair.",
         piece: Piece::Merge,
         inputs: &[Input::State, Input::Number("mine"), Input::Number("theirs")],
         ..MOVES
@@ -192,38 +196,42 @@ const PHASES: [Function; 13] = [
 
 /// Functions for splitting by the rate's sign.
 const SPLITS: [Function; 7] = [
-    Function { name: "predict_open", comment: "One interval on; the direction is as uncertain as the rate.", ..MOVES },
+    Function {
+        name: "predict_open",
+        comment: "Predicts over an interval, with a direction as uncertain as the rate.",
+        ..MOVES
+    },
     Function {
         name: "predict_extend_turning",
-        comment: "One interval on, stretching in the end, where the rate may have turned around on the way.",
+        comment: "Predicts over an interval that ends stretching; the rate may change its sign within it.",
         piece: Piece::PredictTurning(Phase::Extend),
         inputs: &[Input::Number("excess"), Input::Number("turning_variance")],
         ..MOVES
     },
     Function {
         name: "predict_retract_turning",
-        comment: "The same, releasing in the end.",
+        comment: "The same, ending with release.",
         piece: Piece::PredictTurning(Phase::Retract),
         inputs: &[Input::Number("excess"), Input::Number("turning_variance")],
         ..MOVES
     },
     Function {
         name: "is_hopeless",
-        comment: "Whether next to nothing of a prediction is on its side of zero, 1 or -1.",
+        comment: "True if a side of zero, 1 or -1, has a negligible part of a prediction.",
         piece: Piece::Hopeless,
         returns: Returns::Truth,
         ..SIDE
     },
     Function {
         name: "turning_of",
-        comment: "Where the rate may turn around on the way: path beyond the net move's, and its variance.",
+        comment: "Path beyond the net movement, for a rate that may change its sign within the step, and its variance.",
         piece: Piece::Turns,
         outputs: &["excess", "turning_variance"],
         ..SIDE
     },
     Function {
         name: "is_uncertain_of_side",
-        comment: "Whether a side of zero has more than nothing, and less than all, of the rate; otherwise what it has.",
+        comment: "True if the rate may have either sign; otherwise its share on a side of zero is 0 or 1.",
         piece: Piece::CertainOfSide,
         outputs: &["certain"],
         returns: Returns::Truth,
@@ -231,7 +239,7 @@ const SPLITS: [Function; 7] = [
     },
     Function {
         name: "cut_off",
-        comment: "Restricts the rate to a side of zero; what that leaves of the hypothesis.",
+        comment: "Truncates the rate to a side of zero; returns the probability of that side.",
         piece: Piece::CutOff,
         returns: Returns::Number,
         ..SIDE

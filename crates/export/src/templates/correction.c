@@ -3,7 +3,7 @@
 enum { ROWS = << correction.rows.count >>, INDUCING = << correction.inducing >> };
 enum { STRIPES = << correction.processes[0].explained|length >> };
 
-/* Where an input lay in the rows: mean, deviation, range. */
+/* Scale of an input: mean, standard deviation and range in the rows. */
 typedef struct scale_of {
     float mean, sd, lower, upper;
 } scale_of;
@@ -23,7 +23,7 @@ static const scale_of SIMULATED_SCALE[FEATURES] = {
 {% endif %}
 /* Time constants of the low-passes, s. */
 static const float TIME_CONSTANT_S[LOW_PASSES] = {<< correction.time_constants_s|join("f, ") >>f};
-/* What they forget over the usual interval, and its mean: exponentials are dear. */
+/* Share that they forget over the usual interval, and its mean; saves exponentials. */
 static const float USUAL_DECAY[LOW_PASSES] = {<< correction.decays|join("f, ") >>f};
 static const float USUAL_MEAN_DECAY[LOW_PASSES] = {<< correction.mean_decays|join("f, ") >>f};
 
@@ -35,7 +35,7 @@ static const float ROW[ROWS][INPUTS] = {
 {% endfor %}
 };
 
-/* Inputs on their scales, and squares of how far each was outside of its range. */
+/* Standardised inputs, and the squared distance of each outside its range. */
 static void scale_all(const float *input, const scale_of *scales, int count, float *x, float *square)
 {
     int i;
@@ -45,7 +45,7 @@ static void scale_all(const float *input, const scale_of *scales, int count, flo
     }
 }
 
-/* What rows weigh, and what the inducing rows explain: see the Rust crate `ohmstrain-ekf`, module `correction`. */
+/* Gaussian process, by weights of the rows and variance explained by inducing rows: module `correction` of the Rust crate `ohmstrain-ekf`. */
 typedef struct process {
     float weight[ROWS];
     float explained[STRIPES][4]; /* An upper triangle in stripes of four rows: of each the columns from the diagonal on. */
@@ -59,7 +59,7 @@ static const process << p.name >> = {
 };
 {% endfor %}
 
-/* Lets the low-passes see a reading, relative, or wait. */
+/* Passes a relative reading, or the time without one, to the low-passes. */
 static void hear(readings *seen, float dt_s, const float *rho, int surprises)
 {
     const float waited_s = seen->waited_s + dt_s;
@@ -78,7 +78,7 @@ static void hear(readings *seen, float dt_s, const float *rho, int surprises)
     watch(seen, dt_s, rho != 0, rho ? *rho : 0.0f, surprises, decay, mean_decay);
 }
 
-/* What the inducing rows explain of a process. */
+/* Share of the prior variance that the inducing rows explain. */
 static float explained_by(const process *p, const float kernel[INDUCING])
 {
     const float (*w)[4] = p->explained;
@@ -104,7 +104,7 @@ static float explained_by(const process *p, const float kernel[INDUCING])
 {% if correction.simulated %}
 enum { SIMULATED_ROWS = << correction.simulated.rows.count >> };
 
-/* Standardised features of readings that the law gave in simulated motions, and what they say. */
+/* Standardised features of readings simulated by the law, and the weights of these rows. */
 static const float SIMULATED_ROW[SIMULATED_ROWS][FEATURES] = {
 {% for row in correction.simulated.rows.one_by_one %}
     {<< row[6:]|join("f, ") >>f},
@@ -113,7 +113,7 @@ static const float SIMULATED_ROW[SIMULATED_ROWS][FEATURES] = {
 static const float SIMULATED_WEIGHT[SIMULATED_ROWS] = {<< correction.simulated.process.weights|join("f, ") >>f};
 
 {% endif %}
-/* The strain and its variance, corrected. `filtered` is the filter's strain, moved into the limits. */
+/* Returns the corrected strain and its variance. `filtered` is the filter's strain, clamped to the limits. */
 static void correct(const summary *all, const readings *seen, float filtered, float filtered_variance, float *strain,
                     float *variance)
 {

@@ -1,13 +1,13 @@
 /* ---- Hypotheses -------------------------------------------------------------------------------------------------- */
 
 {% if splits %}
-/* The side of zero on which a moving phase has its rates. */
+/* Sign of the rates in a moving phase. */
 static float side_of(int phase)
 {
     return phase == RETRACT ? -1.0f : 1.0f;
 }
 
-/* Restricts the rate to the sign of a moving phase; what that leaves of the hypothesis. */
+/* Truncates the rate to the sign of a moving phase; returns the probability of that sign. */
 static float cut_rate(hypothesis *h, int phase)
 {
     float certain;
@@ -18,7 +18,7 @@ static float cut_rate(hypothesis *h, int phase)
 }
 
 {% endif %}
-/* Takes a reading; returns whether all is sound. */
+/* Updates with a reading; returns true if the result is sound. */
 static int take(hypothesis *h, float rho, float extra_variance, float *innovation, float *variance, float *nis)
 {
     float *x = h->mean, *p = h->covariance;
@@ -40,11 +40,11 @@ typedef struct children {
     ohmstrain_mixture *kept;
     float exponent;
     float density;
-    /* The reading compared with all predictions of it, around the first. */
+    /* Sums of the innovations of all children, relative to the first. */
     float weight, around, distance, square, variance;
 } children;
 
-/* Takes another hypothesis in. */
+/* Merges with another hypothesis. */
 static void merge(hypothesis *into, const hypothesis *other)
 {
     const float total = into->weight + other->weight;
@@ -60,7 +60,8 @@ static void merge(hypothesis *into, const hypothesis *other)
     into->per_inside = mine * into->per_inside + theirs * other->per_inside;
 }
 
-/* Merges a child into the nearest of its phase but that at `but`; without one, or negligible, it is dropped. */
+/* Merges a child into the nearest hypothesis of its phase, except the one at `but`. A negligible child, or one without another, is
+ * dropped. */
 static void merge_into_nearest(ohmstrain_mixture *kept, const hypothesis *child, int but)
 {
     float heaviest = child->weight, least = 0.0f;
@@ -129,7 +130,7 @@ static void add(children *all, hypothesis *child, float factor, float exponent, 
     }
 }
 
-/* Makes the probabilities sum to one and drops what is negligible; whether anything is left. */
+/* Normalises the probabilities and drops negligible hypotheses; returns false if none is left. */
 static int normalise(ohmstrain_mixture *kept)
 {
     float heaviest = 0.0f, sum = 0.0f, per_sum;
@@ -160,7 +161,7 @@ static int normalise(ohmstrain_mixture *kept)
     return 1;
 }
 
-/* Gives a predicted child the reading, if there is one, and adds it. Returns whether all is sound. */
+/* Updates a predicted child with the reading, if there is one, and adds it. Returns true if the result is sound. */
 static int weigh(children *all, hypothesis *child, float prior, const float *rho, float extra_variance)
 {
     float factor = prior, exponent = 0.0f, more_inside;
@@ -194,14 +195,14 @@ static int weigh(children *all, hypothesis *child, float prior, const float *rho
 }
 
 {% if splits %}
-/* The phase of a rate that was left open; what holds has none. */
+/* Phase of a rate whose sign was left open. */
 static int toward(const hypothesis *h)
 {
     return h->phase == HOLD ? HOLD : h->mean[1] < 0.0f ? RETRACT : EXTEND;
 }
 
-/* Probability that `to` follows `from`. Whether a moving body stretches or releases is for the cut to say, or, where the
- * direction stays open, for a reading. */
+/* Probability of phase `to` after `from`. The directions of a moving body get their probabilities by truncation, or, if the direction
+ * is open, by a reading. */
 static float follows(int from, int to, int open, const float chain[PHASES * PHASES])
 {
 {% if rests %}
@@ -221,13 +222,13 @@ static float follows(int from, int to, int open, const float chain[PHASES * PHAS
 {% endif %}
 }
 
-/* Where the rate may turn around on the way: path beyond the net move's, and its variance. */
+/* Path beyond the net movement, for a rate that may change its sign within the step, and its variance. */
 typedef struct turning {
     float excess;
     float variance;
 } turning;
 
-/* A child of `parent` in a phase. Returns whether all is sound. */
+/* Adds a child of `parent` in a phase. Returns true if the result is sound. */
 static int add_child(children *all, const hypothesis *parent, int phase, float probability, const turning *turns,
                      const float s[STEP], const float *rho, float extra_variance)
 {
@@ -271,7 +272,7 @@ static int add_child(children *all, const hypothesis *parent, int phase, float p
     return weigh(all, &child, prior, rho, extra_variance);
 }
 
-/* All children of a hypothesis. Returns whether all is sound. */
+/* Adds all children of a hypothesis. Returns true if the results are sound. */
 static int add_children(children *all, const ohmstrain_mixture *before, const hypothesis *parent, int open,
                         const float s[STEP], const float *rho, float extra_variance)
 {
@@ -294,7 +295,7 @@ static int add_children(children *all, const ohmstrain_mixture *before, const hy
     return 1;
 }
 {% else %}
-/* All children of a hypothesis. Returns whether all is sound. */
+/* Adds all children of a hypothesis. Returns true if the results are sound. */
 static int add_children(children *all, const hypothesis *parent, const float s[STEP], const float *rho,
                         float extra_variance)
 {
@@ -325,7 +326,7 @@ static int add_children(children *all, const hypothesis *parent, const float s[S
 }
 {% endif %}
 
-/* What the filter believes. */
+/* Belief: all hypotheses. */
 typedef ohmstrain_mixture belief;
 
 static void keep(const ohmstrain_state *state, belief *kept)
@@ -384,7 +385,7 @@ static int attempt(ohmstrain_state *state, const interval *over, const float *rh
     return OHMSTRAIN_OK;
 }
 
-/* Before any reading; at a strain that is known if there is one. */
+/* Initial state, at a known strain if there is one. */
 static void start_hypothesis(hypothesis *first, const float *strain)
 {
     int i, j;
@@ -415,8 +416,8 @@ static void start_mixture(ohmstrain_state *state, const float *strain)
 {% endif %}
 }
 
-/* Follows what was known before any reading, too, in place of the lightest hypothesis if there is no other: where a filter has
- * lost its way, that finds it. */
+/* Adds a hypothesis from the initial state, in place of the lightest if there is no room, so that a filter that has lost the strain can
+ * find it again. */
 static void look_again(ohmstrain_state *state)
 {
     ohmstrain_mixture *all = &state->mixture;
@@ -442,7 +443,7 @@ static void look_again(ohmstrain_state *state)
     all->hypothesis[place].weight = BESIDE_SHARE;
 }
 
-/* What all hypotheses say together. */
+/* Moments over all hypotheses. */
 static void summarise(const ohmstrain_state *state, summary *out)
 {
     const ohmstrain_mixture *all = &state->mixture;

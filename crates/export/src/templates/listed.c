@@ -1,8 +1,8 @@
 /* ---- Arithmetic as lists ------------------------------------------------------------------------------------------- */
 
-/* A step compiled for an AVR takes more flash than an Uno has: every operation there calls a function, and moves its operands. There
- * the larger functions are lists of operations, four bytes each, which a loop goes through: the same operations with the same
- * results, in a third of the flash. -DOHMSTRAIN_LISTED=1 takes them elsewhere, =0 leaves them. */
+/* Lists of operations, four bytes each, in place of larger functions on an AVR, run by a loop: the same operations with the same results,
+ * in a third of the flash. Compiled, each operation calls a function and moves its operands, which takes more flash than an Uno has.
+ * -DOHMSTRAIN_LISTED=1 uses lists on other processors, =0 on none. */
 #ifndef OHMSTRAIN_LISTED
 #ifdef __AVR__
 #define OHMSTRAIN_LISTED 1
@@ -23,13 +23,13 @@ enum {
 
 static float falling(float x);
 
-/* A number, or a truth. */
+/* Number or truth value. */
 typedef union cell {
     float number;
     unsigned char truth;
 } cell;
 
-/* What a list works with: its inputs and constants; the state, whose truths follow its numbers; the numbers of the step; arguments. */
+/* Operands of a list: inputs and constants; the state, numbers before truth values; constants of the step; arguments. */
 typedef struct machine {
     const FLASH uint8_t *inputs;
     const FLASH float *constants;
@@ -66,7 +66,7 @@ static cell fetched(const machine *m, uint8_t operand)
     return out;
 }
 
-/* Goes through a list; what comes of it is written at the end. */
+/* Runs a list; its results are written at the end. */
 static void run_list(const FLASH uint8_t *next, const FLASH float *constants, float *state, unsigned char *truths,
                      const float *step, cell *given)
 {

@@ -9,15 +9,14 @@
 #include <stdio.h>
 #endif
 
-/* The larger of `largest` and the difference of two numbers, in ulp; a number that is not one is the largest. */
+/* Maximum of `largest` and the difference of two numbers, in ulp; infinite for NaN. */
 static float larger(float largest, float found, float expected)
 {
     const float difference = fabsf(found - expected) / VECTORS_ULP;
     return difference <= largest ? largest : difference == difference ? difference : INFINITY;
 }
 
-/* A reading that no sensor gives is passed over, with a flag; a deviation that is no number is refused, and leaves the state
- * alone. */
+/* An impossible reading counts as missing, with a flag; a standard deviation of NaN is refused, and leaves the state unchanged. */
 static int without_reading(ohmstrain_state *state, int k)
 {
     ohmstrain_estimate before, after;
@@ -37,7 +36,7 @@ static int without_reading(ohmstrain_state *state, int k)
     return failures;
 }
 
-/* What cannot be read at rest, and what cannot be known, is refused, and leaves the state alone. */
+/* Impossible readings at rest and strains are refused, and leave the state unchanged. */
 static int wrong_rest(ohmstrain_state *state)
 {
     const float rest_reading = state->rest_reading;

@@ -43,7 +43,7 @@ typedef struct fusion {
     errors all, filters;
 } fusion;
 
-/* A channel at one time: ln R/R0, or NAN, and what its filter says. */
+/* Channel at one time: ln R/R0, or NAN, and the estimate of its filter. */
 typedef struct channel {
     float ln_r, strain, sd;
 } channel;
@@ -170,7 +170,7 @@ static void predict(const process *p, int channels, const float *ln_r, const ohm
     *variance += p->noise_variance;
 }
 
-/* Squared distance per channel from the nearest row, as a share of the usual one, without one of the channels. */
+/* Squared distance from the nearest row, per channel and relative to the usual one, without one of the channels. */
 static float distance(const fusion *f, const float *ln_r, int without)
 {
     float nearest = INFINITY;
@@ -346,7 +346,7 @@ static void set(ohmstrain_state *state, int joint, float strain, float sd, float
     state->sd[joint] = fabsf(per_strain) * sd;
 }
 
-/* What the filters say before any reading; channels that are fused count alike. */
+/* Estimate before any reading; fused channels have equal weights. */
 static void report(ohmstrain_state *state)
 {
     int joint;
@@ -443,7 +443,7 @@ ohmstrain_status ohmstrain_step_after(ohmstrain_state *state, float dt_s, const 
     ohmstrain_status status = OHMSTRAIN_OK;
     int taken[OHMSTRAIN_CHANNELS];
 
-    /* Not a number, too. */
+    /* Also false for NaN. */
     if (!state || !reading || !(dt_s >= 0.0f && dt_s < INFINITY)) {
         return OHMSTRAIN_ERR_ARGUMENT;
     }
@@ -469,7 +469,7 @@ ohmstrain_status ohmstrain_step_after(ohmstrain_state *state, float dt_s, const 
             << channel.name >>_estimate estimate;
             << channel.name >>_get(&state-><< channel.stem >>_filter, &estimate);
             flags |= estimate.flags;
-            /* What its own filter turns down, or could not take, is no reading. */
+            /* A reading that its own filter has not used counts as missing. */
             channels[<< loop.index0 >>].ln_r = taken[OHMSTRAIN_CHANNEL_<< channel.label >>] == 0 && r > 0.0f && !(estimate.flags & (<< channel.upper >>_MISSING | << channel.upper >>_IMPLAUSIBLE | << channel.upper >>_STUCK))
                 ? logf(r / state-><< channel.stem >>_filter.rest_reading) : NAN;
             channels[<< loop.index0 >>].strain = estimate.strain;

@@ -11,7 +11,7 @@
 #include "ohmstrain.h"
 
 enum { LONGEST_LINE = 65536 };
-/* What UTF-8 text of some programs begins with. */
+/* Byte order mark of UTF-8. */
 static const char MARK[] = "\xEF\xBB\xBF";
 
 static const char *const COLUMN[OHMSTRAIN_CHANNELS] = {

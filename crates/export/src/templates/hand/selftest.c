@@ -8,7 +8,7 @@
 #include <stdio.h>
 #endif
 
-/* The larger of `largest` and a difference, in deviations; a number that is not one is the largest. */
+/* Maximum of `largest` and a difference, in standard deviations; infinite for NaN. */
 static float larger(float largest, float found, float expected, float sd)
 {
     const float difference = fabsf(found - expected) / sd;

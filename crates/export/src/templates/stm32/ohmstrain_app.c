@@ -15,8 +15,8 @@ static ADC_HandleTypeDef *converter;
 static UART_HandleTypeDef *port;
 static ohmstrain_state state;
 static volatile uint32_t ticks; /* periods of the timer */
-static uint32_t seen;           /* of them, when a step was tried last */
-static uint32_t periods;        /* since the last step that was taken */
+static uint32_t seen;           /* ticks at the last attempt of a step */
+static uint32_t periods;        /* periods since the last step */
 
 void ohmstrain_app_tick(void)
 {
@@ -45,7 +45,7 @@ static bool measure(uint32_t count, float *ohm)
 }
 
 {% if reading_unit == "ohm" %}
-/* Measures what the filter takes: it was calibrated in ohm. */
+/* Measures a reading for the filter, which was calibrated in ohm. */
 static bool take_reading(float *reading)
 {
     return measure(1, reading);
@@ -59,7 +59,7 @@ ohmstrain_status ohmstrain_app_rest(void)
 {% else %}
 static float rest_ohm = 1.0f; /* resistance of the relaxed sensor */
 
-/* Measures what the filter takes: a ratio. */
+/* Measures a reading for the filter, a ratio. */
 static bool take_reading(float *reading)
 {
     float ohm = 0.0f;
@@ -79,7 +79,7 @@ ohmstrain_status ohmstrain_app_rest(void)
 }
 {% endif %}
 
-/* Sends a line. One that the port does not take in time is lost; the next one has a time of its own. */
+/* Sends a line. A line that the port does not take in time is lost. */
 static void send(char *line, int length)
 {
     (void)HAL_UART_Transmit(port, (uint8_t *)line, (uint16_t)length, UART_TIMEOUT_MS);
@@ -123,14 +123,14 @@ void ohmstrain_app_poll(void)
     if (now == seen) {
         return;
     }
-    periods += now - seen; /* right when the count wraps, too */
+    periods += now - seen; /* also right when the count wraps */
     seen = now;
     since_s = OHMSTRAIN_DT_S * (float)periods;
     /* A failed conversion is a missing reading. */
     status = take_reading(&reading) ? ohmstrain_step_after(&state, since_s, reading, 0.0f, 0)
                                     : ohmstrain_predict_for(&state, since_s);
     if (status != OHMSTRAIN_OK) {
-        /* Everything is as it was before: the next step takes the time of this one, too. */
+        /* The state is unchanged, so the next step includes this one's time. */
         send(line, snprintf(line, sizeof line, "# the step was refused: %d\r\n", (int)status));
         return;
     }

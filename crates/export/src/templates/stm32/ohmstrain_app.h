@@ -16,8 +16,8 @@
 {% if reading_unit == "ohm" %}
 /* Starts the filter and prints the header of the lines. */
 {% else %}
-/* Starts the filter and prints the header of the lines. The filter was calibrated with ratios: the sensor has to be relaxed,
- * its resistance at rest is measured. */
+/* Starts the filter and prints the header of the lines. The filter was calibrated with ratios, so the sensor has to be relaxed
+ * while its resistance at rest is measured. */
 {% endif %}
 ohmstrain_status ohmstrain_app_init(ADC_HandleTypeDef *adc, UART_HandleTypeDef *uart);
 
@@ -27,8 +27,8 @@ void ohmstrain_app_tick(void);
 /* Takes a step if a period has passed and prints time_ms,strain,strain_sd,flags; for the main loop. */
 void ohmstrain_app_poll(void);
 
-/* Measures the sensor at rest and starts the filter again from there. To be called from the main loop while the sensor is
- * relaxed. Returns an error, and leaves everything as it was, if the sensor is not connected. */
+/* Measures the sensor at rest and restarts the filter. Call it from the main loop while the sensor is relaxed. Returns an
+ * error, and changes nothing, if the sensor is not connected. */
 ohmstrain_status ohmstrain_app_rest(void);
 
 #endif
