@@ -29,14 +29,14 @@ pub(crate) struct RowWriter {
 impl RowWriter {
     /// Returns the row of a reading and the filter's output.
     fn row(&mut self, row: (f64, Reading), output: &Output) -> Estimate {
-        self.errors.restate(row.0, output.estimate.strain);
+        self.errors.restate(row.0, output.stated());
         self.known_row(row, output)
     }
 
     /// Returns the row of an output, corrected by known errors.
     fn known_row(&self, (time_s, reading): (f64, Reading), stated: &Output) -> Estimate {
         let mut output = *stated;
-        output.estimate.strain = self.errors.correct(time_s, stated.estimate.strain);
+        output.estimate.strain = self.errors.correct(time_s, stated.stated());
         self.scale.row(time_s, reading, &output)
     }
 }
@@ -122,7 +122,7 @@ impl Filter {
         let output = kernel.filter.output();
         let mut row = kernel.rows.row((time_s, reading), &output);
         while let Some(known) = next_until(&mut kernel.known, time_s) {
-            kernel.know(KnownStrain { time_s, known, estimated: output.estimate.strain });
+            kernel.know(KnownStrain { time_s, known, estimated: output.stated() });
             row = kernel.rows.known_row((time_s, reading), &output);
         }
         self.last = Some(Last { time_s, reading, output });
@@ -153,7 +153,7 @@ impl Filter {
             kernel.known.push_front((f64::NEG_INFINITY, known));
             return Ok(kernel.rows.scale.row(f64::NAN, Reading::MISSING, &kernel.filter.output()));
         };
-        kernel.know(KnownStrain { time_s, known, estimated: output.estimate.strain });
+        kernel.know(KnownStrain { time_s, known, estimated: output.stated() });
         Ok(kernel.rows.known_row((time_s, reading), &output))
     }
 
@@ -360,7 +360,7 @@ impl LaggedFilter {
     fn take_known(&mut self) {
         let Some(time_s) = self.last_s else { return };
         while let Some(known) = next_until(&mut self.kernel.known, time_s) {
-            let estimated = self.kernel.filter.strain();
+            let estimated = self.kernel.filter.output().stated();
             self.kernel.know(KnownStrain { time_s, known, estimated });
         }
     }

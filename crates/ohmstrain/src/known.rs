@@ -2,7 +2,7 @@ use std::collections::VecDeque;
 
 use ohmstrain_ekf::Gaussian;
 use ohmstrain_model::StrainRange;
-use ohmstrain_sensor::{KnownErrors, KnownStrain, MOST_KNOWN};
+use ohmstrain_sensor::{KnownErrors, KnownStrain, MOST_KNOWN, Stated};
 
 use crate::Error;
 use crate::estimate::Scale;
@@ -72,7 +72,7 @@ impl KnownOfAll {
     }
 
     /// Corrects an estimate by the errors at known strains.
-    pub(crate) fn correct(&mut self, time_s: f64, estimated: Gaussian<f64>) -> Gaussian<f64> {
+    pub(crate) fn correct(&mut self, time_s: f64, estimated: Stated) -> Gaussian<f64> {
         let before = self.strains.partition_point(|strain| strain.time_s <= time_s);
         let is_new = self.around.as_ref().is_none_or(|around| around.0 != before);
         if is_new {
@@ -80,6 +80,6 @@ impl KnownOfAll {
             let last = self.strains.len().min(before + MOST_KNOWN / 2);
             self.around = Some((before, KnownErrors::of(self.limits, &self.strains[first..last])));
         }
-        self.around.as_ref().map_or(estimated, |(_, errors)| errors.correct(time_s, estimated))
+        self.around.as_ref().map_or(estimated.widened(), |(_, errors)| errors.correct(time_s, estimated))
     }
 }

@@ -2,7 +2,7 @@ use std::ops::Range;
 
 use ohmstrain_ekf::live::RestFollower;
 use ohmstrain_ekf::{Gaussian, StepError};
-use ohmstrain_sensor::{EstimatorKind, KnownStrain, Rows};
+use ohmstrain_sensor::{EstimatorKind, KnownStrain, Rows, Stated};
 
 use crate::estimate::Scale;
 use crate::known::{KnownOfAll, in_order, next_until};
@@ -89,18 +89,19 @@ impl FilterBuilder<'_> {
         while k < len && !due.is_empty() {
             let time_s = row(k).0;
             while let Some(strain) = next_until(&mut due, time_s) {
-                known.push((k, KnownStrain { time_s, known: strain, estimated: strain }));
+                let estimated = Stated { strain, doubted: 0.0 };
+                known.push((k, KnownStrain { time_s, known: strain, estimated }));
             }
             k += 1;
         }
         if !known.is_empty() {
-            let listen = |k: usize, _: f64, estimated: Gaussian<f64>| {
+            let listen = |k: usize, _: f64, estimated: Stated| {
                 let first = known.partition_point(|known| known.0 < k);
                 known[first..]
                     .iter_mut()
                     .take_while(|known| known.0 == k)
                     .for_each(|known| known.1.estimated = estimated);
-                estimated
+                estimated.widened()
             };
             self.smooth_with(len, row, listen, |_, _| Ok::<(), Error>(()))?;
         }
@@ -113,7 +114,7 @@ impl FilterBuilder<'_> {
         self,
         len: usize,
         row: impl Fn(usize) -> (f64, Reading),
-        mut known: impl FnMut(usize, f64, Gaussian<f64>) -> Gaussian<f64>,
+        mut known: impl FnMut(usize, f64, Stated) -> Gaussian<f64>,
         mut take: impl FnMut(Range<usize>, &[Estimate]) -> Result<(), E>,
     ) -> Result<(), E> {
         let starts_known = self.initial_strain.is_some();
@@ -161,7 +162,7 @@ impl FilterBuilder<'_> {
                     output.widen(doubts, output.estimate.strain, widened);
                     output.doubts = flags;
                 }
-                output.estimate.strain = known(k, time_s, output.estimate.strain);
+                output.estimate.strain = known(k, time_s, output.stated());
                 scale.row(time_s, reading, output)
             }));
             estimates.reverse();

@@ -35,7 +35,7 @@ pub use params::{
 };
 pub use run::build::{FilterParts, HISTORIES, HYPOTHESES, build_filter, build_filter_with, build_smoother_with};
 pub use run::corrected::{future_features, outputs};
-pub use run::known::{KnownErrors, KnownStrain, MOST_KNOWN};
+pub use run::known::{KnownErrors, KnownStrain, MOST_KNOWN, Stated};
 pub use run::learned::Learned;
 pub use run::options::Options;
 pub use run::portable::{PortableCorrection, PortableFilter};

@@ -26,14 +26,16 @@ struct Size {
     probability: f64,
     fast: f64,
     slow: f64,
+    /// Share of the doubts' variance that lasts: all of it on another day.
+    doubted: f64,
 }
 
 /// `docs/notes/2026-11-24-known-strains-figures.md` documents their choice.
 const SIZES: [Size; 4] = [
-    Size { probability: 0.85, fast: 0.97, slow: 0.03 },
-    Size { probability: 0.08, fast: 0.7, slow: 0.3 },
-    Size { probability: 0.04, fast: 1.0, slow: 3.0 },
-    Size { probability: 0.03, fast: 1.0, slow: 30.0 },
+    Size { probability: 0.85, fast: 0.97, slow: 0.03, doubted: 0.0 },
+    Size { probability: 0.08, fast: 0.7, slow: 0.3, doubted: 0.0 },
+    Size { probability: 0.04, fast: 1.0, slow: 3.0, doubted: 1.0 },
+    Size { probability: 0.03, fast: 1.0, slow: 30.0, doubted: 1.0 },
 ];
 
 /// A strain known at one time, and its estimate.
@@ -44,14 +46,32 @@ pub struct KnownStrain {
     /// The known strain, with its variance.
     pub known: Gaussian<f64>,
     /// Estimate of the strain, without the effect of earlier known strains.
-    pub estimated: Gaussian<f64>,
+    pub estimated: Stated,
+}
+
+/// Estimate of a strain, and the part of its variance that doubts have added.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Stated {
+    /// Estimate, with the variance stated by the filter.
+    pub strain: Gaussian<f64>,
+    /// Variance added by doubts.
+    pub doubted: f64,
+}
+
+impl Stated {
+    /// Returns the estimate with its whole variance.
+    #[must_use]
+    pub const fn widened(&self) -> Gaussian<f64> {
+        Gaussian { mean: self.strain.mean, variance: self.strain.variance + self.doubted }
+    }
 }
 
 /// Errors of a filter at other times, inferred from strains known at single times.
 ///
 /// The error is a Gaussian process in time. One part lasts for seconds, in units of the stated standard deviation. An offset and
 /// an error of the gain last for an hour, in units of the mean stated deviation where strains are known. Their magnitude is one of
-/// a few sizes, each weighted by the likelihood of the known strains (a mixture of Gaussian processes).
+/// a few sizes, each weighted by the likelihood of the known strains (a mixture of Gaussian processes). The variance that doubts add lasts
+/// with the large sizes, as a wrong R₀ does; with the small ones it is independent from row to row, and known strains do not reduce it.
 #[derive(Clone, Debug)]
 pub struct KnownErrors {
     limits: StrainRange<f64>,
@@ -73,11 +93,13 @@ struct ErrorSize {
     weighted: DVector<f64>,
 }
 
-/// Time, standard deviation and lever of an estimate, which determine the covariance of its error with that of another.
+/// Time, standard deviations and lever of an estimate, which determine the covariance of its error with that of another.
 #[derive(Clone, Copy)]
 struct EstimatePoint {
     time_s: f64,
     sd: f64,
+    /// Standard deviation of the error due to doubts.
+    doubted_sd: f64,
     /// Distance from the middle of the limits, of variance one if the strain may be anywhere in them.
     lever: f64,
 }
@@ -87,7 +109,9 @@ impl Size {
     fn covariance(self, usual: f64, a: EstimatePoint, b: EstimatePoint) -> f64 {
         let apart_s = (a.time_s - b.time_s).abs();
         let fast = self.fast * a.sd * b.sd * (-apart_s / FAST_S).exp();
-        fast + self.slow * usual * (-apart_s / SLOW_S).exp() * (1.0 + GAIN * a.lever * b.lever)
+        let lasts = (-apart_s / SLOW_S).exp() * (1.0 + GAIN * a.lever * b.lever);
+        // The mean of its last factor is 1 + GAIN.
+        fast + (self.slow * usual + self.doubted * a.doubted_sd * b.doubted_sd / (1.0 + GAIN)) * lasts
     }
 }
 
@@ -117,7 +141,7 @@ impl KnownErrors {
     }
 
     /// Replaces the estimate at the time of a known strain, if it has changed since, for example after a lag.
-    pub fn restate(&mut self, time_s: f64, estimated: Gaussian<f64>) {
+    pub fn restate(&mut self, time_s: f64, estimated: Stated) {
         let mut is_new = false;
         for strain in self.strains.iter_mut().filter(|strain| strain.time_s == time_s) {
             (strain.estimated, is_new) = (estimated, true);
@@ -140,9 +164,9 @@ impl KnownErrors {
 
     /// Corrects an estimate at a time by its expected error.
     #[must_use]
-    pub fn correct(&self, time_s: f64, estimated: Gaussian<f64>) -> Gaussian<f64> {
+    pub fn correct(&self, time_s: f64, estimated: Stated) -> Gaussian<f64> {
         if self.sizes.is_empty() {
-            return estimated;
+            return estimated.widened();
         }
         let here = self.place(time_s, &estimated);
         let errors = self.sizes.iter().map(|size| (size.weight, size.error(self.usual, here, self.places())));
@@ -150,13 +174,14 @@ impl KnownErrors {
         let mean = errors.iter().map(|(weight, error)| weight * error.mean).sum::<f64>();
         let spread = |error: &Gaussian<f64>| error.variance + (error.mean - mean).powi(2);
         let variance = errors.iter().map(|(weight, error)| weight * spread(error)).sum();
-        Gaussian { mean: self.limits.clamp(estimated.mean + mean), variance }
+        Gaussian { mean: self.limits.clamp(estimated.strain.mean + mean), variance }
     }
 
-    fn place(&self, time_s: f64, estimated: &Gaussian<f64>) -> EstimatePoint {
+    fn place(&self, time_s: f64, Stated { strain, doubted }: &Stated) -> EstimatePoint {
         let StrainRange { lower, upper } = self.limits;
-        let off = (estimated.mean - 0.5 * (lower + upper)) / (upper - lower);
-        EstimatePoint { time_s, sd: estimated.sd(), lever: 12.0_f64.sqrt() * off.clamp(-FARTHEST, FARTHEST) }
+        let off = (strain.mean - 0.5 * (lower + upper)) / (upper - lower);
+        let lever = 12.0_f64.sqrt() * off.clamp(-FARTHEST, FARTHEST);
+        EstimatePoint { time_s, sd: strain.sd(), doubted_sd: doubted.sqrt(), lever }
     }
 
     fn places(&self) -> impl Iterator<Item = EstimatePoint> {
@@ -168,9 +193,10 @@ impl KnownErrors {
             return;
         }
         let places: Vec<EstimatePoint> = self.places().collect();
-        let errors = self.strains.iter().map(|strain| strain.known.mean - strain.estimated.mean);
+        let errors = self.strains.iter().map(|strain| strain.known.mean - strain.estimated.strain.mean);
         let errors = DVector::from_iterator(places.len(), errors);
-        let usual = self.strains.iter().map(|strain| strain.estimated.variance).sum::<f64>() / places.len() as f64;
+        let usual =
+            self.strains.iter().map(|strain| strain.estimated.strain.variance).sum::<f64>() / places.len() as f64;
         let given = |size: Size| {
             let noise = |row: usize| self.strains[row].known.variance;
             let of =
@@ -197,7 +223,8 @@ impl ErrorSize {
         let shared = DVector::from_iterator(self.weighted.len(), shared);
         let mean = shared.dot(&self.weighted);
         let explained = self.covariance.l_dirty().solve_lower_triangular(&shared).map_or(0.0, |row| row.norm_squared());
-        Gaussian { mean, variance: (self.size.covariance(usual, here, here) - explained).max(0.0) }
+        let passing = (1.0 - self.size.doubted) * here.doubted_sd * here.doubted_sd;
+        Gaussian { mean, variance: (self.size.covariance(usual, here, here) - explained).max(0.0) + passing }
     }
 }
 
@@ -208,34 +235,48 @@ mod tests {
     const LIMITS: StrainRange<f64> = StrainRange { lower: 0.0, upper: 0.4 };
 
     fn strain(time_s: f64, known: f64, estimated: f64) -> KnownStrain {
-        let [known, estimated] = [(known, 4e-6), (estimated, 4e-4)].map(|(mean, variance)| Gaussian { mean, variance });
-        KnownStrain { time_s, known, estimated }
+        KnownStrain { time_s, known: Gaussian { mean: known, variance: 4e-6 }, estimated: estimate(estimated) }
     }
 
-    fn estimate(mean: f64) -> Gaussian<f64> {
-        Gaussian { mean, variance: 4e-4 }
+    fn estimate(mean: f64) -> Stated {
+        Stated { strain: Gaussian { mean, variance: 4e-4 }, doubted: 0.0 }
     }
 
-    /// Compares with the conditional distribution of two Gaussian variables for each size, and Bayes' rule.
+    /// Compares with the conditional distribution of two Gaussian variables for each size, and Bayes' rule; without doubts, and with some
+    /// that differ between the rows.
     #[test]
     fn one_known_strain_is_conditioned_on() {
-        let errors = KnownErrors::of(LIMITS, &[strain(10.0, 0.13, 0.1)]);
+        for (doubted, later_doubted) in [(0.0, 0.0), (9e-4, 16e-4)] {
+            let mut known = strain(10.0, 0.13, 0.1);
+            known.estimated.doubted = doubted;
+            conditioned_on(&KnownErrors::of(LIMITS, &[known]), doubted, later_doubted);
+        }
+    }
+
+    fn conditioned_on(errors: &KnownErrors, doubted: f64, later_doubted: f64) {
         let (lever, later_lever) = ((12.0_f64).sqrt() * -0.25, 12.0_f64.sqrt() * 0.125);
         for later_s in [0.0, 2.0, 60.0, 5000.0] {
-            let of_size = |(probability, fast, slow): (f64, f64, f64)| {
-                let here = 4e-4 * (fast + slow * (1.0 + lever * lever)) + 4e-6;
-                let there = 1e-4 * fast + 4e-4 * slow * (1.0 + later_lever * later_lever);
-                let slow_now = slow * f64::exp(-later_s / 3600.0) * (1.0 + lever * later_lever);
-                let both = 2e-4 * fast * f64::exp(-later_s / 3.0) + 4e-4 * slow_now;
+            let of_size = |(probability, fast, slow, lasts): (f64, f64, f64, bool)| {
+                let [d, later_d, both_d] = [doubted, later_doubted, (doubted * later_doubted).sqrt()];
+                let [d, later_d, both_d] =
+                    [d, later_d, both_d].map(|variance| if lasts { variance / 2.0 } else { 0.0 });
+                let here = 4e-4 * fast + (4e-4 * slow + d) * (1.0 + lever * lever) + 4e-6;
+                let there = 1e-4 * fast + (4e-4 * slow + later_d) * (1.0 + later_lever * later_lever);
+                let passing = if lasts { 0.0 } else { later_doubted };
+                let slow_now = (4e-4 * slow + both_d) * f64::exp(-later_s / 3600.0) * (1.0 + lever * later_lever);
+                let both = 2e-4 * fast * f64::exp(-later_s / 3.0) + slow_now;
                 let density = f64::exp(-0.5 * 0.03 * 0.03 / here) / here.sqrt();
-                (probability * density, both / here * 0.03, there - both * both / here)
+                (probability * density, both / here * 0.03, there - both * both / here + passing)
             };
-            let parts = [(0.85, 0.97, 0.03), (0.08, 0.7, 0.3), (0.04, 1.0, 3.0), (0.03, 1.0, 30.0)].map(of_size);
+            let sizes =
+                [(0.85, 0.97, 0.03, false), (0.08, 0.7, 0.3, false), (0.04, 1.0, 3.0, true), (0.03, 1.0, 30.0, true)];
+            let parts = sizes.map(of_size);
             let total: f64 = parts.iter().map(|part| part.0).sum();
             let mean: f64 = parts.iter().map(|part| part.0 / total * part.1).sum();
             let variance: f64 =
                 parts.iter().map(|part| part.0 / total * (part.2 + (part.1 - mean).powi(2))).sum::<f64>();
-            let found = errors.correct(10.0 + later_s, Gaussian { mean: 0.25, variance: 1e-4 });
+            let later = Stated { strain: Gaussian { mean: 0.25, variance: 1e-4 }, doubted: later_doubted };
+            let found = errors.correct(10.0 + later_s, later);
             assert!((found.mean - 0.25 - mean).abs() < 1e-12, "{later_s} s: {found:?} {mean}");
             assert!((found.variance / variance - 1.0).abs() < 1e-9, "{later_s} s: {found:?} {variance}");
         }
@@ -272,8 +313,8 @@ mod tests {
     fn the_last_ones_count() {
         let strains: Vec<_> = (0..40).map(|k| strain(20.0 * f64::from(k), 0.2, 0.2 + 0.001 * f64::from(k))).collect();
         let mut errors = KnownErrors::new(LIMITS);
-        assert!(errors.is_empty() && errors.correct(3.0, estimate(0.1)) == estimate(0.1));
-        assert_eq!(KnownErrors::of(LIMITS, &[]).correct(3.0, estimate(0.1)), estimate(0.1));
+        assert!(errors.is_empty() && errors.correct(3.0, estimate(0.1)) == estimate(0.1).widened());
+        assert_eq!(KnownErrors::of(LIMITS, &[]).correct(3.0, estimate(0.1)), estimate(0.1).widened());
         strains.iter().for_each(|strain| errors.tell(*strain));
         let at_once = KnownErrors::of(LIMITS, &strains[40 - MOST_KNOWN..]);
         assert_eq!(errors.correct(900.0, estimate(0.3)), at_once.correct(900.0, estimate(0.3)));
@@ -283,7 +324,7 @@ mod tests {
         );
         // An estimate is replaced later.
         let mut restated = strains.clone();
-        restated[30].estimated.mean = 0.1;
+        restated[30].estimated.strain.mean = 0.1;
         errors.restate(600.0, estimate(0.1));
         assert_eq!(
             errors.correct(900.0, estimate(0.3)),

@@ -21,6 +21,7 @@ use ohmstrain_ekf::live::{Doubts, Flags};
 use ohmstrain_ekf::{Estimate, Gaussian, Reading, ReadingVerdict, StepError};
 use serde::{Deserialize, Serialize};
 
+use crate::run::known::Stated;
 use crate::run::turns::Turns;
 
 /// Live filter of a sensor whose number of branches and estimator are known only at run time. It can be moved between threads
@@ -172,6 +173,9 @@ pub struct Output {
     pub reading: Option<Reading<f64>>,
     /// Flags raised by doubts.
     pub doubts: Flags,
+    /// Variance of the strain that doubts have added.
+    #[serde(default)]
+    pub doubted: f64,
     /// Relative deviation of R₀, as tracked by the filter, from that of the calibration.
     pub rest_off: f64,
 }
@@ -180,8 +184,17 @@ impl Output {
     /// Widens the estimate of the strain, `stated` before doubts, to `variance`. The prediction of the reading after a hold is
     /// widened by the equivalent on the mean slope.
     pub fn widen(&mut self, doubts: &Doubts<f64>, stated: Gaussian<f64>, variance: f64) {
-        self.estimate.still_relaxes.variance += doubts.of_reading(variance - stated.variance).max(0.0);
+        let added = variance - stated.variance;
+        self.estimate.still_relaxes.variance += doubts.of_reading(added).max(0.0);
         self.estimate.strain = Gaussian { variance, ..stated };
+        self.doubted += added.max(0.0);
+    }
+
+    /// Returns the strain, and the part of its variance that doubts have added.
+    #[must_use]
+    pub const fn stated(&self) -> Stated {
+        let Gaussian { mean, variance } = self.estimate.strain;
+        Stated { strain: Gaussian { mean, variance: (variance - self.doubted).max(0.0) }, doubted: self.doubted }
     }
 }
 

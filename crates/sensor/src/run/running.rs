@@ -85,6 +85,7 @@ impl<const B: usize, const N: usize> Reports<B, N> {
             phases: state.phases(),
             reading: measured.reading,
             doubts: Flags::NONE,
+            doubted: 0.0,
             rest_off: 0.0,
         }
     }

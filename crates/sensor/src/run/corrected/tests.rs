@@ -44,6 +44,7 @@ fn says(time_s: f64, gap: f64, verdict: ReadingVerdict) -> Output {
         phases: Some([0.7, 0.1, 0.2]),
         reading: None,
         doubts: Flags::NONE,
+        doubted: 0.0,
         rest_off: 0.0,
     }
 }
