@@ -71,7 +71,7 @@ impl Stated {
 /// The error is a Gaussian process in time. One part lasts for seconds, in units of the stated standard deviation. An offset and
 /// an error of the gain last for an hour, in units of the mean stated deviation where strains are known. Their magnitude is one of
 /// a few sizes, each weighted by the likelihood of the known strains (a mixture of Gaussian processes). The variance that doubts add lasts
-/// with the large sizes, as a wrong R₀ does; with the small ones it is independent from row to row, and known strains do not reduce it.
+/// with the large sizes, as a wrong R₀ does; with the small ones a known strain reduces it for seconds.
 #[derive(Clone, Debug)]
 pub struct KnownErrors {
     limits: StrainRange<f64>,
@@ -219,11 +219,16 @@ impl KnownErrors {
 impl ErrorSize {
     /// Returns the error of an estimate, given that errors are of this size.
     fn error(&self, usual: f64, here: EstimatePoint, known: impl Iterator<Item = EstimatePoint>) -> Gaussian<f64> {
-        let shared = known.map(|place| self.size.covariance(usual, here, place));
+        let mut nearest_s = f64::INFINITY;
+        let shared = known.map(|place| {
+            nearest_s = nearest_s.min((here.time_s - place.time_s).abs());
+            self.size.covariance(usual, here, place)
+        });
         let shared = DVector::from_iterator(self.weighted.len(), shared);
         let mean = shared.dot(&self.weighted);
         let explained = self.covariance.l_dirty().solve_lower_triangular(&shared).map_or(0.0, |row| row.norm_squared());
         let passing = (1.0 - self.size.doubted) * here.doubted_sd * here.doubted_sd;
+        let passing = passing * -(-2.0 * nearest_s / FAST_S).exp_m1();
         Gaussian { mean, variance: (self.size.covariance(usual, here, here) - explained).max(0.0) + passing }
     }
 }
@@ -262,7 +267,7 @@ mod tests {
                     [d, later_d, both_d].map(|variance| if lasts { variance / 2.0 } else { 0.0 });
                 let here = 4e-4 * fast + (4e-4 * slow + d) * (1.0 + lever * lever) + 4e-6;
                 let there = 1e-4 * fast + (4e-4 * slow + later_d) * (1.0 + later_lever * later_lever);
-                let passing = if lasts { 0.0 } else { later_doubted };
+                let passing = if lasts { 0.0 } else { later_doubted * (1.0 - f64::exp(-2.0 * later_s / 3.0)) };
                 let slow_now = (4e-4 * slow + both_d) * f64::exp(-later_s / 3600.0) * (1.0 + lever * later_lever);
                 let both = 2e-4 * fast * f64::exp(-later_s / 3.0) + slow_now;
                 let density = f64::exp(-0.5 * 0.03 * 0.03 / here) / here.sqrt();
