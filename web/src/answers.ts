@@ -1,4 +1,4 @@
-/** What a person has said of files, as flags of `ohmstrain import`. */
+/** Answers about files, as flags of `ohmstrain import`. */
 
 /** A word as a POSIX shell takes it. */
 export function quoted(word: string): string {

@@ -111,7 +111,7 @@ function list(texts: string[]): HTMLElement {
   return h("ol", {}, ...texts.map((text) => h("li", {}, text)));
 }
 
-/** What was estimated in each quarter by what was fitted to the others, one plot for each recording. */
+/** Estimates of each quarter by the fit to the others, one plot for each recording. */
 function leftOut(made: Closing): HTMLElement[] {
   const rows = made.leftOut.length / 6;
   const column = (index: number) => made.leftOut.subarray(index * rows, (index + 1) * rows);

@@ -1,6 +1,6 @@
 /** Columns of a stream without a header: what its cells may be. */
 
-/** What a column of a stream can be called. */
+/** Names of a column of a stream. */
 export const STREAM_ROLES: [string, string][] = [
   ["", "nothing"],
   ["time_s", "time, s"],

@@ -13,7 +13,7 @@ const BAUDS = ["9600", "19200", "38400", "57600", "115200", "230400", "250000", 
 /** Lines without a header after which columns are asked for. */
 const LINES_WITHOUT = 8;
 const RAW_LINES = 8;
-/** What comes of a calm stream is taken no more often than this, ms: nobody sees more, and a laptop lasts longer. */
+/** Least time between updates from a calm stream, ms; it saves a battery, and nobody sees more. */
 const CALM_MS = 90;
 
 const chosen = { baud: "115200", frontEnd: "", recording: "", speed: "1" };

@@ -1,4 +1,4 @@
-/** What is shown while readings come: the strain and its interval, the stream, counts, and what a person can tell. */
+/** View of a live stream: strain and interval, state of the stream, counts, and controls. */
 
 import type { SensorDescription, StreamSummary } from "../pkg/ohmstrain.js";
 import { h } from "./dom";
@@ -94,7 +94,7 @@ export class LiveView {
     this.recordButton.textContent = name ? `Stop recording ${name}` : "Record";
   }
 
-  /** Whether there are so few rows that one frame for several of them shows all. */
+  /** True if the rows are so few that one frame shows several of them. */
   get isCalm(): boolean {
     const times = this.columns[0] ?? [];
     return RECENT < CALM * ((times.at(-1) ?? 0) - (times.at(-1 - RECENT) ?? Number.NEGATIVE_INFINITY));

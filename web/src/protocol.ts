@@ -1,4 +1,4 @@
-/** What page and worker hand to each other. */
+/** Messages between page and worker. */
 
 /** A recording as a plot takes it. NaN stands for what is missing. */
 export interface RecordingData {
@@ -20,7 +20,7 @@ export interface Series {
   warnings: string[];
 }
 
-/** Where a calibration is. */
+/** Stage of a calibration. */
 export interface Progress {
   call: number;
   stage: string;

@@ -216,7 +216,7 @@ export function plotOf(recording: RecordingData): HTMLElement {
   return plot.element;
 }
 
-/** Where the cards stand. */
+/** Place of the cards. */
 export function show(groups: Group[]): void {
   byId("recordings").replaceChildren(...groups.map((group) => group.element));
 }

@@ -32,12 +32,12 @@ export class LineSplitter {
   }
 }
 
-/** Whether this browser can open serial ports. */
+/** True if this browser can open serial ports. */
 export function hasSerial(): boolean {
   return "serial" in navigator;
 }
 
-/** Where there is no Web Serial. */
+/** Text for browsers without Web Serial. */
 export const NO_SERIAL =
   "This browser cannot open serial ports. Chrome, Edge and Opera on a computer can; recordings can be played in any browser.";
 

@@ -1,4 +1,4 @@
-/** What the page has: recordings and a sensor, and who wants to know of others. */
+/** State of the page: recordings, a sensor, and listeners for changes. */
 
 import type { SensorDescription } from "../pkg/ohmstrain.js";
 import { Engine } from "./engine";

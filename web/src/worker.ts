@@ -58,7 +58,7 @@ function streamInUse(): Stream {
   return stream;
 }
 
-/** What a calibration came to. */
+/** Result of a calibration. */
 function closing(made: Calibrated) {
   return {
     lines: made.lines(),
@@ -158,7 +158,7 @@ const methods = {
   },
 };
 
-/** What can be asked of the worker. */
+/** Requests to the worker. */
 export type Methods = typeof methods;
 
 let current = 0;

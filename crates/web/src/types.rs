@@ -4,7 +4,7 @@ use wasm_bindgen::prelude::*;
 
 #[wasm_bindgen(typescript_custom_section)]
 const TYPES: &str = r#"
-/** What is left to choose in a calibration; each has a default. */
+/** Options of a calibration; each has a default. */
 export interface Choices {
   /** `auto`, or the name of an estimator: `ekf` takes a second or two. */
   estimator?: string;
@@ -12,20 +12,20 @@ export interface Choices {
   branches?: number;
   /** `auto`, `polynomial`, `decaying-exponential` or `tunnelling`. */
   gauge?: string;
-  /** Whether a reference that is late is moved. */
+  /** True to move a reference that is late. */
   align?: boolean;
   /** Only rows at this time, s, or later. */
   from?: number;
   /** Only rows before this time, s. */
   until?: number;
-  /** What sentences call the sensor's file. */
+  /** Name of the sensor's file in sentences. */
   file?: string;
 }
 
-/** How a filter is to be; each has a default. */
+/** Options of a filter; each has a default. */
 export interface Wishes {
   estimator?: string;
-  /** What the rested sensor reads now, in its unit. */
+  /** Reading of the rested sensor now, in its unit. */
   restResistance?: number;
   initialStrain?: number;
   /** Squared innovations over their variance above this are outliers. */
@@ -46,13 +46,13 @@ export interface SensorDescription {
   estimators: string[];
   quantity: "strain" | "angle_deg";
   unit: "ohm" | "ratio";
-  /** What the rested sensor read in calibration. */
+  /** Reading of the rested sensor in calibration. */
   rest: number;
   limits: [number, number];
   columns: string[];
 }
 
-/** What a filter costs on a chip, estimated. */
+/** Estimated cost of a filter on a chip. */
 export interface Cost {
   instructions: number;
   flash: number;
@@ -60,7 +60,7 @@ export interface Cost {
   stack: number;
 }
 
-/** What there is to say of the lines of a board. */
+/** State of a stream of lines from a board. */
 export interface StreamSummary {
   counts: { rows: number; missing: number; badLines: number; restarts: number };
   message: string;
@@ -70,12 +70,12 @@ export interface StreamSummary {
   metadata: string;
 }
 
-/** What stands in files. */
+/** Findings about files. */
 export interface Described {
   files: DescribedFile[];
   question: { text: string; answers: string[] } | null;
   remarks: string[];
-  /** Flags of `ohmstrain import` that say all of it. */
+  /** Flags of `ohmstrain import` for all of it. */
   flags: string;
   is_trace: boolean;
   roles: { name: string; units: string[] }[];
