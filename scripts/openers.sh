@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Fails where the first sentence of a doc comment begins with a word that hides its subject: CONTRIBUTING.md, "English".
-# So do comments before functions and constants of exported C.
+# Comments before functions and constants of exported C are checked, too.
 # scripts/openers.sh [--list] [PATH...]: --list only lists, without failing; the default path is the sources of all crates.
 set -euo pipefail
 cd "$(dirname "$0")/.."
