@@ -3,6 +3,9 @@ use crate::error::{Fault, quote};
 
 /// The range of a 32-bit microsecond counter.
 const WRAP_US: u64 = 1 << 32;
+/// A counter that decreases has wrapped if that is a step forward by less than this share of its range. A device that was restarted
+/// begins at 0, too, but seldom so shortly before its counter would have wrapped.
+pub(crate) const LONGEST_WRAP: u64 = 8;
 
 /// The time column, checked to increase strictly.
 pub(crate) enum Clock {
@@ -81,8 +84,8 @@ fn seconds(cell: &str, last: Option<f64>) -> Result<f64, Fault> {
     }
 }
 
-/// Reads a 32-bit counter, which restarts at 0 after 71.6 minutes. A decrease that, modulo 2³², is a step forward of
-/// less than half the range counts as a restart, any other as time going backwards.
+/// Reads a 32-bit counter, which wraps to 0 after 71.6 minutes. A decrease that, modulo 2³², is a step forward of
+/// less than an eighth of the range is a wrap, any other is time going backwards.
 fn microseconds(cell: &str, last: Option<Microseconds>) -> Result<Microseconds, Fault> {
     const NAME: &str = Column::TimeUs.name();
     let wrong = |_| Fault::in_column(NAME, "a time in whole microseconds", quote(cell));
@@ -94,7 +97,7 @@ fn microseconds(cell: &str, last: Option<Microseconds>) -> Result<Microseconds, 
         None if last.counter < WRAP_US => counter + WRAP_US - last.counter,
         None => 0,
     };
-    if step == 0 || (counter < last.counter && step >= WRAP_US / 2) {
+    if step == 0 || (counter < last.counter && step >= WRAP_US / LONGEST_WRAP) {
         return Err(backwards());
     }
     let unwrapped = last.unwrapped.checked_add(step).ok_or_else(backwards)?;
@@ -121,6 +124,8 @@ mod tests {
     #[test]
     fn a_counter_that_steps_back_has_not_wrapped() {
         assert_eq!(times(Column::TimeUs, &["1000", "900"])[1], None);
+        // A board that was restarted after 40 minutes.
+        assert_eq!(times(Column::TimeUs, &["2400000000", "0"])[1], None);
         assert_eq!(times(Column::TimeUs, &["1000", "1000"])[1], None);
         assert_eq!(times(Column::TimeUs, &["5000000000", "4"])[1], None);
         assert_eq!(times(Column::TimeUs, &["5000000000", "5000000001"])[1], Some(5000.000001));

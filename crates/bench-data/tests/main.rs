@@ -20,6 +20,8 @@ mod import_headers;
 #[cfg(feature = "import")]
 mod import_json;
 #[cfg(feature = "import")]
+mod import_misread;
+#[cfg(feature = "import")]
 mod import_recordings;
 #[cfg(feature = "import")]
 mod import_rig;

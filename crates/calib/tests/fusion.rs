@@ -196,6 +196,23 @@ fn readings_that_calibration_has_not_seen_are_doubted() {
     assert!(unlike > 0.9 && covered(&rows, &new) > 0.9, "{unlike} {}", covered(&rows, &new));
 }
 
+/// The regressions on the remaining channels err more than those on all, whose noise they were fitted with.
+#[test]
+fn what_is_left_of_the_channels_covers() {
+    let (seen, new) = (made(1, 0.9), made(2, 0.8));
+    let fit = fit(&seen).unwrap();
+    for only in 0..CHANNELS {
+        let fusion = Fusion::new(Arc::new(fit.params.clone()));
+        let rows = fused(
+            fusion,
+            &new,
+            |_, _| Member::UNKNOWN,
+            |_, row| (0..CHANNELS).filter(|c| *c != only).for_each(|c| row[c] = f64::NAN),
+        );
+        assert!(covered(&rows, &new) > 0.9, "{only}: {}", covered(&rows, &new));
+    }
+}
+
 #[test]
 fn channels_of_other_times_are_refused() {
     let made = made(1, 0.9);

@@ -25,6 +25,7 @@ pub use wide::{COLUMNS, named, table, wrapped, wrapped_table};
 
 use crate::error::CliError;
 use crate::printable::{printable_json, printable_lines};
+use crate::whole_file::is_stdin;
 use ohmstrain::MADE_BY;
 
 /// The files that a command writes.
@@ -57,7 +58,9 @@ impl Outputs {
     /// Creates the outputs of a command that reads `inputs`. With `force` they replace files of other kinds, but never an
     /// input.
     pub fn new<'a>(force: bool, inputs: impl IntoIterator<Item = &'a PathBuf>) -> Self {
-        let known = |path: &'a PathBuf| Some((path.clone(), Identity::of(path)?));
+        // Standard input may be one of the files: `filter -o trace.csv < trace.csv`.
+        let opened = |path: &'a PathBuf| if is_stdin(path) { Path::new("/dev/stdin") } else { path.as_path() };
+        let known = |path: &'a PathBuf| Some((path.clone(), Identity::of(opened(path))?));
         let inputs = inputs.into_iter().filter_map(known).collect();
         Self { force, inputs, files: Vec::new(), folders: Vec::new(), published: false }
     }

@@ -55,6 +55,23 @@ pub fn compile_and_run(compiler: &str, folder: &Path, sources: &[&str], stdin: &
 }
 
 /// C exported by earlier versions compiles with today's compilers, and passes its self-test.
+/// An estimator without an exported form is refused, whether it is asked for or the sensor's default.
+#[test]
+fn an_estimator_that_cannot_be_exported_is_refused() {
+    let bench = Bench::calibrated();
+    for kind in ["imm", "ukf"] {
+        let calibrate = ["calibrate", "trace.csv", "--until", "60", "--branches", "1", "-o", "other.toml", "--force"];
+        bench.run(&[&calibrate[..], &["--estimator", kind]].concat()).ok();
+        let export = ["export", "--sensor", "other.toml", "--dt-s", DT_S, "--target", "c", "-o"];
+        let refused =
+            format!("other.toml: the estimator {kind} has no exported form; export another one with --estimator ekf");
+        bench.run(&[&export[..], &["c"]].concat()).fails(4, &refused);
+        bench.run(&[&export[..], &["ekf", "--estimator", "ekf"]].concat()).ok();
+        let table = bench.run(&[&export[..], &["lean", "--budget", "lean"]].concat()).ok();
+        assert!(table.contains("ekf") && !table.contains(kind), "{table}");
+    }
+}
+
 #[test]
 fn exported_c_of_released_versions_passes_its_self_test() {
     let released = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/released"));

@@ -124,6 +124,36 @@ fn an_input_or_another_output_is_not_replaced_whatever_it_is_called() {
     refused(&bench, &[&CALIBRATE[..], &["new.toml", "--report", "folder/../new.toml"]].concat(), ARGUMENTS, message);
 }
 
+/// `filter -o trace.csv < trace.csv` would read what it writes.
+#[cfg(unix)]
+#[test]
+fn the_file_on_standard_input_is_not_replaced() {
+    let bench = Bench::calibrated();
+    let before = bench.read("trace.csv");
+    for command in ["filter", "smooth"] {
+        let input = std::fs::File::open(bench.path("trace.csv")).unwrap();
+        let run = std::process::Command::new(assert_cmd::cargo::cargo_bin!("ohmstrain"))
+            .args([command, "--sensor", "sensor.toml", "-", "-o", "trace.csv", "--force"])
+            .current_dir(bench.path("."))
+            .stdin(input)
+            .output()
+            .unwrap();
+        let stderr = String::from_utf8_lossy(&run.stderr);
+        assert_eq!(run.status.code(), Some(ARGUMENTS), "{command}: {stderr}");
+        assert!(stderr.contains("cannot write trace.csv: it is the input -"), "{command}: {stderr}");
+    }
+    assert!(bench.read("trace.csv") == before);
+}
+
+#[test]
+fn marks_are_not_replaced_by_columns_of_the_same_names() {
+    let bench = Bench::calibrated();
+    bench.write("marks.csv", "time_s,strain,strain_sd\n1,0.1,0.01\n");
+    let columns = ["--columns", "time_s,strain,strain_sd", "-o", "marks.csv"];
+    let filter = ["filter", "trace.csv", "--sensor", "sensor.toml"];
+    refused(&bench, &[&filter[..], &columns].concat(), ARGUMENTS, "cannot write marks.csv: it holds something else");
+}
+
 /// The recording is unreadable, too, and would be reported first if the output were checked later.
 #[test]
 fn an_output_that_cannot_be_written_is_noticed_before_the_work() {

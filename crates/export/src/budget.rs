@@ -4,11 +4,11 @@ use std::str::FromStr;
 
 use ohmstrain_sensor::{EstimatorKind, SensorParams};
 
-use super::ExportError;
 use super::boards::Board;
 use super::cost::{Cost, Processor, cost_of};
 use super::plan::{ChipFilter, Plan};
 use super::reduced::RowBudget;
+use super::{ExportError, FILTERS};
 
 /// Largest permitted cost of a filter, on a Cortex-M4F or on a board.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -208,8 +208,9 @@ fn plans(params: &SensorParams) -> Vec<Plan> {
             Left::None => Plan { kind: Some(kind), hypotheses, rows: None },
         }
     };
+    let is_exported = FILTERS.contains(&kind);
     let is_there = |(_, left): &(usize, Left)| is_corrected || matches!(left, Left::None);
-    let mut plans: Vec<Plan> = ORDER.into_iter().filter(is_there).map(of).collect();
+    let mut plans: Vec<Plan> = ORDER.into_iter().filter(|left| is_exported && is_there(left)).map(of).collect();
     if kind == EstimatorKind::Ekf {
         // It has one hypothesis.
         plans.retain(|plan| plan.hypotheses == Some(8));

@@ -4,7 +4,7 @@ use ohmstrain_sensor::{EstimatorKind, HYPOTHESES, PortableFilter, SensorParams};
 
 use super::quadratic::OwnedQuadratic;
 use super::reduced::{RowBudget, reduced};
-use super::{ExportError, parameter};
+use super::{ExportError, FILTERS, parameter};
 
 /// Parts of a filter that are exported.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -29,9 +29,13 @@ impl ChipFilter {
     /// Creates the filter of a sensor, restricted to the plan.
     ///
     /// # Errors
-    /// If the sensor has no parameters for it, or its correction cannot be reduced.
+    /// If the sensor has no parameters for it, it has no exported form, or its correction cannot be reduced.
     pub fn new(params: &SensorParams, plan: &Plan) -> Result<Self, ExportError> {
         let mut filter = PortableFilter::new(params, plan.kind).map_err(parameter)?;
+        if !FILTERS.contains(&filter.kind) {
+            let what = format!("the estimator {} has no exported form", filter.kind.name());
+            return Err(ExportError::Unsupported { what, instead: "export another one with --estimator ekf" });
+        }
         if filter.kind != EstimatorKind::Ekf {
             filter.hypotheses = plan.hypotheses.map_or(filter.hypotheses, |most| most.min(filter.hypotheses));
         }

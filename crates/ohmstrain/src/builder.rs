@@ -257,7 +257,7 @@ impl<'a> FilterBuilder<'a> {
     }
 
     /// Builds a filter that resumes from a stored one of the same sensor and options, to the bit. R₀ and known strains come
-    /// from the state; known strains given here are added.
+    /// from the state; known strains given here are added, unless they are of earlier rows.
     ///
     /// # Errors
     /// If the state is of another sensor, other options or another version; or if an initial strain is given, since the first

@@ -60,13 +60,16 @@ impl Kernel {
         })
     }
 
-    /// Resumes from a stored state; known strains of both remain.
-    fn resume(&mut self, stored: StoredKernel) -> Result<(), Error> {
+    /// Resumes from a state that was stored after the row at `last_s`. Known strains of both remain; those of earlier rows, and those
+    /// that the state has already, count once.
+    fn resume(&mut self, stored: StoredKernel, last_s: Option<f64>) -> Result<(), Error> {
         let StoredKernel { rest_reading, known, strains, filter } = stored;
         self.filter.resume(filter).map_err(|error| StoredError::Content(Box::new(error)))?;
         self.rows.scale.rest_reading = rest_reading;
         self.rows.errors = KnownErrors::of(self.rows.scale.limits, &strains);
-        self.known.extend(known.into_iter().map(Ahead::strain));
+        let ahead: Vec<_> = known.into_iter().map(Ahead::strain).collect();
+        self.known.retain(|given| last_s.is_none_or(|last_s| given.0 > last_s) && !ahead.contains(given));
+        self.known.extend(ahead);
         self.known.make_contiguous().sort_by(|a, b| a.0.total_cmp(&b.0));
         Ok(())
     }
@@ -186,7 +189,7 @@ impl Filter {
 
     pub(crate) fn resume(&mut self, stored: &Stored) -> Result<(), Error> {
         stored.check(&self.kernel.made_of, None)?;
-        self.kernel.resume(stored.kernel.clone())?;
+        self.kernel.resume(stored.kernel.clone(), stored.last.map(|last| last.time_s))?;
         self.last = stored.last;
         Ok(())
     }
@@ -349,7 +352,7 @@ impl LaggedFilter {
 
     pub(crate) fn resume(&mut self, stored: &Stored) -> Result<(), Error> {
         stored.check(&self.kernel.made_of, Some(self.lag_s))?;
-        self.kernel.resume(stored.kernel.clone())?;
+        self.kernel.resume(stored.kernel.clone(), stored.last_s)?;
         self.waiting = stored.waiting.iter().map(|row| (row.time_s, row.reading)).collect();
         self.last_s = stored.last_s;
         Ok(())

@@ -81,6 +81,12 @@ impl FilterRun {
 
     /// Creates a filter that resumes from a stored state.
     fn resumed(sensor: &Sensor, args: &FilterArgs, stored: &Stored) -> Result<Self, CliError> {
+        if let Some(RestResistance::First(count)) = args.estimate.rest_resistance {
+            let message = format!(
+                "--rest-resistance first:{count}: R0 is in the state of --resume; leave it out, or give it in ohms"
+            );
+            return Err(CliError::Arguments(message));
+        }
         let builder = builder(sensor, &args.estimate);
         let filter = match args.lag_s {
             None => builder.resume(stored).map(Lag::None),

@@ -118,7 +118,9 @@ const FUSION: [&str; 2] = ["novelty = ", "sd_scale = "];
 
 /// True if recordings may have a column of this name, too.
 fn is_recorded(name: &str) -> bool {
-    ["time_s", "resistance_ohm", "resistance_ratio", "strain", "angle_deg"].contains(&name)
+    const COLUMNS: [&str; 7] =
+        ["time_s", "resistance_ohm", "resistance_ratio", "strain", "angle_deg", "strain_sd", "angle_sd"];
+    COLUMNS.contains(&name)
 }
 
 /// True if a header is that of `hand`: for each joint an angle or a strain, and its deviation.

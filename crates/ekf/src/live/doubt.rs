@@ -344,11 +344,12 @@ impl<T: Recordable> Doubts<T> {
         self.judge(&left, passed_s, rho, nis);
     }
 
-    /// Takes a row in a smoother's backward pass, which has no doubts due to a start or a fault. The row is `run_s` after the
-    /// first row and `dt_s` before the next reading; `unturned_s` is the time between the turns of the readings before and
-    /// after it.
+    /// Takes a row in a smoother's backward pass, which has no doubts due to a fault; a start in an unknown strain is doubted as in a
+    /// filter. The row is `run_s` after the first row and `dt_s` before the next reading; `unturned_s` is the time between the turns of
+    /// the readings before and after it.
     pub fn see_back(&mut self, run_s: T, dt_s: T, unturned_s: T, reading: Option<(T, T)>) {
-        (self.run_s, self.starts, self.fading) = (run_s, false, T::zero());
+        let of_start = if self.starts { self.parts.start * Left::after(run_s).soon } else { T::zero() };
+        (self.run_s, self.fading) = (run_s, of_start);
         self.turns.iter_mut().for_each(|turns| turns.lasts(unturned_s));
         if let Some((rho, nis)) = reading {
             self.judge(&Left::after(dt_s), dt_s, rho, nis);

@@ -130,11 +130,21 @@ impl Fusion {
 }
 
 impl FusionParams {
-    /// Computes the regressions on these channels; `None` for each if there is no channel.
+    /// Computes the regressions on these channels; `None` for each if there is no channel. Noise and length are those of a fit to all
+    /// channels; fewer leave larger errors than these state, of which the rows of the calibration tell the size.
     fn conditioned(&self, channels: &[usize]) -> Vec<Option<Regression>> {
         let rows: Vec<&FusionRow> = self.rows.iter().collect();
-        let span = self.limits.span();
-        self.regressions.iter().map(|params| Regression::new(&rows, params, channels, span)).collect()
+        let (all, span) = ((0..self.channels()).collect::<Vec<usize>>(), self.limits.span());
+        let on = |params: &RegressionParams| {
+            let some = Regression::new(&rows, params, channels, span)?;
+            if channels == all {
+                return Some(some);
+            }
+            let of_all = Regression::new(&rows, params, &all, span).map_or(0.0, |all| all.excess());
+            let unstated = some.excess() - of_all.min(0.0);
+            Some(some.with_unstated(unstated))
+        };
+        self.regressions.iter().map(on).collect()
     }
 
     /// Returns the faulty channel: the one without which the readings are like some of the calibration, although they are not with

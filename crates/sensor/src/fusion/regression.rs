@@ -40,6 +40,8 @@ pub struct Regression {
     inputs: Vec<Vec<f64>>,
     factor: Cholesky<f64, Dyn>,
     weights: DVector<f64>,
+    /// Variance of errors beyond the stated one, in squares of the strain's range.
+    unstated: f64,
 }
 
 impl Regression {
@@ -68,7 +70,28 @@ impl Regression {
             inputs,
             factor,
             weights,
+            unstated: 0.0,
         })
+    }
+
+    /// Returns the mean square error of rows left out one by one beyond the variance that is stated for them, in squares of the strain's
+    /// range; negative if they are stated too uncertain.
+    ///
+    /// Source: Rasmussen and Williams, equations 5.10 to 5.12.
+    #[must_use]
+    pub fn excess(&self) -> f64 {
+        let inverse = self.factor.inverse();
+        let of_row = |row: usize| {
+            let variance = inverse[(row, row)].recip();
+            (self.weights[row] * variance).powi(2) - variance
+        };
+        (0..self.inputs.len()).map(of_row).sum::<f64>() / self.inputs.len() as f64
+    }
+
+    /// Adds a variance in squares of the strain's range; a negative one counts as none.
+    #[must_use]
+    pub fn with_unstated(self, variance: f64) -> Self {
+        Self { unstated: variance.max(0.0), ..self }
     }
 
     /// Returns the strain; its standard deviation includes the noise.
@@ -81,7 +104,8 @@ impl Regression {
         self.factor.l_dirty().solve_lower_triangular_mut(&mut covariance);
         let prior = kernel(&input, &input, self.params.length);
         // Rounding may make the variance negative.
-        let variance = (prior - covariance.norm_squared()).max(0.0) + self.params.noise * self.params.noise;
+        let variance =
+            (prior - covariance.norm_squared()).max(0.0) + self.params.noise * self.params.noise + self.unstated;
         Member { strain: self.mean_strain + mean * self.span, sd: variance.sqrt() * self.span }
     }
 }
@@ -180,6 +204,16 @@ mod tests {
         // The inverse of a matrix whose condition is below 1e4 loses four digits of sixteen.
         assert!((found.strain - expected).abs() < 1e-11, "{found:?} {expected}");
         assert!((found.sd - 0.3 * variance.sqrt()).abs() < 1e-11, "{found:?}");
+        // Each row from the others.
+        let of_row = |left: usize| {
+            let others = noisy.clone().remove_row(left).remove_column(left).try_inverse().unwrap();
+            let k = noisy.column(left).remove_row(left);
+            let predicted = (k.transpose() * &others * targets.clone().remove_row(left))[0];
+            let variance = noisy[(left, left)] - (k.transpose() * &others * &k)[0];
+            (targets[left] - predicted).powi(2) - variance
+        };
+        let excess = (0..5).map(of_row).sum::<f64>() / 5.0;
+        assert!((regression.excess() - excess).abs() < 1e-11, "{} {excess}", regression.excess());
     }
 
     /// Far from all rows, in a direction in which no two rows differ, the strain is as uncertain as before, or more.

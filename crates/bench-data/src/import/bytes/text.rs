@@ -46,7 +46,12 @@ pub(crate) fn lines(text: &str) -> Result<Vec<(u64, &str)>, (u64, Fault)> {
     let ends: &[char] = if text.contains('\n') { &['\n'] } else { &['\r', '\n'] };
     let numbered = text.split(ends).zip(1..).map(|(line, number)| (number, line.trim_end_matches('\r')));
     let mut lines = Vec::new();
-    for (number, line) in numbered.filter(|(_, line)| !line.trim().is_empty()) {
+    // A heading may contain line ends: `"Time\n(s)","Resistance\n(kOhm)"`.
+    let (head, skipped) = quoted_head(text);
+    if let Some(head) = head {
+        lines.push((1, head));
+    }
+    for (number, line) in numbered.skip(skipped).filter(|(_, line)| !line.trim().is_empty()) {
         if line.len() > LONGEST_LINE {
             return Err((number, Fault::new(format!("a line of at most {LONGEST_LINE} bytes"), "a longer one")));
         }
@@ -57,4 +62,17 @@ pub(crate) fn lines(text: &str) -> Result<Vec<(u64, &str)>, (u64, Fault)> {
         lines.push((number, line));
     }
     Ok(lines)
+}
+
+/// Returns a first line whose quoted cells contain line ends, and its number of lines; none, and 0, if it is of another kind.
+fn quoted_head(text: &str) -> (Option<&str>, usize) {
+    const MOST_LINES: usize = 8;
+    let is_open = |head: &str| head.matches('"').count() % 2 == 1;
+    let ends = text.match_indices('\n').map(|(at, _)| at).take(MOST_LINES).zip(1..);
+    let first = text.split('\n').next().unwrap_or_default();
+    if !text.starts_with('"') || !is_open(first) {
+        return (None, 0);
+    }
+    let closed = ends.skip(1).find(|(end, _)| !is_open(&text[..*end]));
+    closed.map_or((None, 0), |(end, count)| (Some(text[..end].trim_end_matches('\r')), count))
 }

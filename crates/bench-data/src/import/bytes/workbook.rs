@@ -93,8 +93,16 @@ fn cell(data: Data) -> Cell<'static> {
             Cell::Text(text.trim().to_owned().into())
         }
         Data::Bool(value) => Cell::Number(f64::from(u8::from(value))),
+        Data::DateTime(time) if time.is_duration() => Cell::Text(elapsed(time.as_f64()).into()),
         Data::DateTime(stamp) => Cell::Date(stamp.as_f64()),
         Data::Error(error) => Cell::Text(error.to_string().into()),
         Data::Empty => Cell::Empty,
     }
+}
+
+/// Writes elapsed days as hours, which may be more than 24, minutes and seconds.
+fn elapsed(days: f64) -> String {
+    let microseconds = (days * 86_400e6).round();
+    let (minutes, seconds) = ((microseconds / 60e6).floor(), microseconds.rem_euclid(60e6) / 1e6);
+    format!("{}:{:02}:{seconds:09.6}", (minutes / 60.0).floor(), minutes.rem_euclid(60.0))
 }

@@ -15,6 +15,9 @@ use crate::order::median;
 /// Number of cells that determine the role of a column without a name.
 const FIRST_CELLS: usize = 5;
 
+/// Least number of rows in which a constant resistance is a setting.
+const FEWEST_ROWS: usize = 5;
+
 /// Possible role of a column, by its name and unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Candidate {
@@ -229,5 +232,10 @@ fn says(table: &Table, place: usize) -> Option<(Role, Sureness)> {
         number_of(&cell, decimal).is_some()
             || matches!(cell, Cell::Text(text) if is_stamp(&text) || ohms(&text, decimal).is_some())
     };
-    suggested.filter(|_| column.cells.cells().any(is_value))
+    let found = suggested.filter(|_| column.cells.cells().any(is_value));
+    // A constant resistance is a setting, such as the range of a meter or the other arm of a divider.
+    let ohms = || column.cells.iter().filter(|cell| !cell.is_empty());
+    let is_setting =
+        || column.cells.len() >= FEWEST_ROWS && ohms().next().is_some_and(|first| ohms().all(|cell| cell == first));
+    found.filter(|(role, _)| *role != Role::Resistance || !is_setting())
 }

@@ -4,8 +4,8 @@ use crate::import::roles::facts::{Dates, Facts, Found};
 use crate::import::roles::recipe::Recipe;
 use crate::import::table::{Column, Table};
 use crate::import::words::Role;
-use crate::import::words::kinds::{self, is_change, is_conductance};
-use crate::import::words::names::doubtful_unit;
+use crate::import::words::kinds::{self, is_change, is_conductance, is_difference};
+use crate::import::words::names::{doubtful_unit, unit_within};
 use crate::import::words::stamp::Order;
 use crate::import::words::units::{self, Scale, Unit};
 
@@ -60,8 +60,14 @@ impl Asked<'_> {
         if let Some(unit) = self.by_metadata() {
             return Ok(unit);
         }
-        if let Some(text) = self.column.unit.as_ref().filter(|unit| !self.is_pin(unit)) {
+        if self.role == Role::Resistance && is_difference(&self.column.name) {
+            let what = "a change of resistance is not read: add the resistance at rest first, or take R or R/R0";
+            return Err(ImportError::unreadable(&self.table.file, format!("{}: {what}", self.name)));
+        }
+        let own = self.column.unit.clone().filter(|unit| !self.is_pin(unit));
+        if let Some(text) = &own.or_else(|| unit_within(self.role, &self.column.heading)) {
             self.refuse_large_ratio(text)?;
+            self.refuse_formatted_percent(text)?;
             return units::unit(self.role, text).ok_or_else(|| {
                 if Role::READINGS.contains(&self.role) && matches!(text.to_lowercase().as_str(), "v" | "mv") {
                     let what = "volts are not read: make a column of ohms of them first (of a divider, with the sensor at \
@@ -94,6 +100,21 @@ impl Asked<'_> {
         }
         let what = format!("{}: percent of the resistance at rest, or of its change", self.name);
         Err(self.question(what, &["percent", "change-percent"]))
+    }
+
+    /// Refuses percent in a workbook whose numbers are at most one: cells that are formatted as percent contain fractions.
+    fn refuse_formatted_percent(&self, unit: &str) -> Result<(), ImportError> {
+        let is_percent =
+            self.role == Role::Strain && units::unit(self.role, unit).is_some_and(|unit| unit.name == "percent");
+        let largest = (self.facts)().numbers.largest;
+        if !is_percent || !self.table.layout.format.contains("workbook") || largest > 1.0 {
+            return Ok(());
+        }
+        let what = format!(
+            "{}: up to {largest:.3}, which may be percent, or fractions that the workbook shows as percent",
+            self.name
+        );
+        Err(self.question(what, &["percent", "1"]))
     }
 
     fn question(&self, what: String, names: &[&str]) -> ImportError {

@@ -17,6 +17,8 @@ pub(crate) use values::{Values, check_positive, converted};
 /// Longest gap that is bridged, in typical steps, unless the values on both sides are equal.
 const LONGEST_GAP: f64 = 10.0;
 
+/// Largest time after a restart, as a share of the time since the recording's start.
+const RESTART: f64 = 0.1;
 /// Answers for a clock that restarts.
 const ANOTHER_RECORDING: [&str; 2] = [
     "--split-recordings if another recording begins here, for a file of each",
@@ -53,6 +55,11 @@ impl Series {
                     let (last, time) = rounded_distinct(last, time);
                     let place = format!("{}:{}", table.file, table.lines[row]);
                     let what = format!("expected a time after {last} s, found {time} s");
+                    // A clock that restarts begins anew.
+                    let start = series.time.first().copied().unwrap_or_default();
+                    if time - start > RESTART * (last - start) {
+                        return Err(ImportError::unreadable(&place, format!("{what}: the rows are out of order")));
+                    }
                     return Err(ImportError::question(&place, what, ANOTHER_RECORDING.map(str::to_owned)));
                 }
                 _ => series.push(time, value, row),

@@ -1,9 +1,10 @@
+use crate::clock::LONGEST_WRAP;
 use crate::error::{Fault, quote};
 use crate::import::error::ImportError;
 use crate::import::roles::{Channel, Clock};
 use crate::import::series::values::Values;
 use crate::import::table::Table;
-use crate::import::words::stamp::{DAY, Order, past_midnight, stamp};
+use crate::import::words::stamp::{DAY, Order, Stamp, past_midnight, stamp};
 use crate::import::words::{Scale, is_missing, nanoseconds};
 
 /// Least time, s, that is not counted from the start of a recording, but from 1970 or, in days, from the end of 1899.
@@ -48,8 +49,7 @@ fn counts(tables: &[Table], channel: &Channel, own_missing: &[String]) -> Result
         "us" => WRAP / 1e6,
         _ => return Ok(Times { seconds, ..Times::default() }),
     };
-    // Like the trace's own `time_us`: a decrease that, modulo 2³², is a step forward of less than half the range counts
-    // as a wrap.
+    // Like the trace's own `time_us`: a decrease that, modulo 2³², is a short step forward is a wrap.
     let unit_s = wrap_s / WRAP;
     let (mut wraps, mut last) = (0_u32, f64::NAN);
     for value in &mut seconds {
@@ -57,7 +57,7 @@ fn counts(tables: &[Table], channel: &Channel, own_missing: &[String]) -> Result
         if bare.is_nan() {
             continue;
         }
-        if bare < last && last < wrap_s && bare + wrap_s - last < wrap_s / 2.0 {
+        if bare < last && last < wrap_s && bare + wrap_s - last < wrap_s / LONGEST_WRAP as f64 {
             wraps += 1;
         }
         last = bare;
@@ -94,17 +94,24 @@ fn stamps(tables: &[Table], channel: &Channel) -> Result<Times, ImportError> {
     let order = Order::ALL.into_iter().find(|order| order.unit() == channel.unit.name).unwrap_or(Order::Iso);
     let cells = &table.columns[channel.place.column].cells;
     let mut found: Vec<Option<i128>> = Vec::with_capacity(cells.len());
-    let mut has_dates = false;
+    let mut first_read: Option<Stamp> = None;
     for (row, cell) in cells.iter().enumerate() {
         let read = stamp(cell, order);
         if read.is_none() && !is_missing(cell, &[]) {
             let expected = format!("a date or a time of day in column {}", table.name(channel.place.column));
             return Err(ImportError::content(&table.file, table.lines[row], Fault::new(expected, quote(cell))));
         }
-        has_dates |= read.is_some_and(|read| read.has_date);
+        if let (Some(first), Some(read)) = (first_read, read)
+            && first.has_date != read.has_date
+        {
+            let expected =
+                if first.has_date { "a date as in the rows above" } else { "a time of day as in the rows above" };
+            return Err(ImportError::content(&table.file, table.lines[row], Fault::new(expected, quote(cell))));
+        }
+        first_read = first_read.or(read);
         found.push(read.map(|read| read.nanoseconds));
     }
-    if !has_dates {
+    if !first_read.is_some_and(|first| first.has_date) {
         past_midnight(&mut found);
     }
     let first = found.iter().position(Option::is_some);

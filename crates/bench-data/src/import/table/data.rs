@@ -72,7 +72,7 @@ impl Data {
         let is_numbered = counts.len() > 2
             && counts.len() == data().count()
             && counts.windows(2).all(|pair| pair[1] > pair[0])
-            && matches!(counts[0], 0 | 1);
+            && (matches!(counts[0], 0 | 1) || counts.windows(2).all(|pair| pair[1] == pair[0] + 1));
         Self { shape, ends_empty, is_numbered }
     }
 

@@ -10,6 +10,8 @@ use crate::metadata::Metadata;
 
 /// Largest number of header lines above the data: two of names, one of units.
 const MOST_HEADER_LINES: usize = 3;
+/// How a logger reduced its samples to a row: a line of these below the units is skipped.
+const PROCESSES: [&str; 8] = ["smp", "avg", "max", "min", "std", "tot", "med", "win"];
 
 /// Lines above the data.
 #[derive(Debug, Default)]
@@ -88,9 +90,10 @@ impl Header {
         data: &Data,
     ) -> Result<usize, ImportError> {
         let mut lines: Vec<(usize, Vec<String>)> = Vec::new();
-        for row in (first..self.first_row).rev().take(MOST_HEADER_LINES) {
-            let cells = if row + 1 == self.first_row {
-                let names = data.names_above(grid, decimal, self.first_row);
+        let below = self.first_row - usize::from(self.first_row > first && is_process_line(grid, self.first_row - 1));
+        for row in (first..below).rev().take(MOST_HEADER_LINES) {
+            let cells = if row + 1 == below {
+                let names = data.names_above(grid, decimal, below);
                 self.given_names = names.as_ref().and_then(|names| names.given);
                 names.map(|names| names.cells)
             } else {
@@ -115,6 +118,13 @@ impl Header {
         if has_units {
             self.unit_line = true;
             self.units = lines[0].1.iter().map(|cell| Some(cell.clone()).filter(|cell| !cell.is_empty())).collect();
+        }
+        if let (false, [_, (_, above), ..]) = (has_units, &lines[..])
+            && is_unit_line(above)
+        {
+            self.unit_line = true;
+            self.units = above.iter().map(|cell| Some(cell.clone()).filter(|cell| !cell.is_empty())).collect();
+            lines.remove(1);
         }
         let names: Vec<&(usize, Vec<String>)> = lines.iter().skip(usize::from(has_units)).collect();
         let Some((row, nearest)) = names.first() else { return Ok(lines[0].0) };
@@ -155,9 +165,17 @@ impl Header {
     }
 }
 
+/// True if a line states how samples were reduced.
+fn is_process_line(grid: &Grid, row: usize) -> bool {
+    let cells = grid.cells(row);
+    let mut filled = cells.iter().filter(|cell| !cell.is_empty()).peekable();
+    filled.peek().is_some() && filled.all(|cell| PROCESSES.contains(&cell.to_string().to_lowercase().as_str()))
+}
+
 /// True if all cells, apart from empty ones, are units, or short words beside at least as many units.
 fn is_unit_line(cells: &[String]) -> bool {
-    let filled = || cells.iter().filter(|cell| !cell.is_empty());
+    // `TS` and `RN` are the times and the row numbers of a logger.
+    let filled = || cells.iter().filter(|cell| !cell.is_empty() && !matches!(cell.as_str(), "TS" | "RN"));
     let units = filled().filter(|cell| units::is_unit(cell)).count();
     units > 0 && filled().all(|cell| cell.chars().count() <= 12) && 2 * units >= filled().count() && {
         // `t`, `R`, `x` are primarily names: in a line of units, a cell that names a quantity must also be a unit.

@@ -1,5 +1,6 @@
 //! Recordings as JSON: an object or a list for each row, on separate lines or in a list, or a list for each column.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 
 use crate::import::bytes::{Cell, Json, Rows, json_values};
@@ -12,7 +13,7 @@ pub(crate) fn rows(text: &str) -> Option<Rows<'static>> {
     if !text.trim_start_matches(['\u{feff}', ' ', '\n', '\r', '\t']).starts_with(['{', '[']) {
         return None;
     }
-    let mut values = json_values(text);
+    let mut values = json_values(&with_null(text));
     let others = values.iter().filter(|(_, value)| value.is_none()).count();
     if others * 5 > values.len() {
         return None;
@@ -26,9 +27,7 @@ pub(crate) fn rows(text: &str) -> Option<Rows<'static>> {
 /// Returns the rows of a file that is a single value.
 fn whole(value: Json) -> Option<Rows<'static>> {
     match value {
-        Json::List(list) if list.iter().all(|item| !matches!(item, Json::Cell(_))) => {
-            records((1..).zip(list.into_iter().map(Some)).collect())
-        }
+        Json::List(list) if !list.iter().any(is_cell) => records((1..).zip(list.into_iter().map(Some)).collect()),
         Json::Object(pairs) => of_object(pairs),
         _ => None,
     }
@@ -45,15 +44,49 @@ fn of_object(pairs: Vec<(String, Json)>) -> Option<Rows<'static>> {
         return Some(rows);
     }
     let longest = pairs.iter().map(|(_, value)| list_of_cells(value).len()).max()?;
-    if longest > 1 {
+    let is_of_rows =
+        |value: &Json| matches!(value, Json::List(rows) if rows.len() > longest && !rows.iter().any(is_cell));
+    if longest > 1 && !pairs.iter().any(|(_, value)| is_of_rows(value)) {
         let columns = pairs.into_iter().map(|(name, value)| (name, list_of_cells(&value)));
-        let columns: Vec<_> = columns.filter(|(_, cells)| cells.len() == longest).take(MOST_COLUMNS).collect();
+        // Shorter lists are settings, unless they only lack the last values.
+        let columns: Vec<_> = columns.filter(|(_, cells)| cells.len() * 10 >= longest * 9).take(MOST_COLUMNS).collect();
         let names = columns.iter().map(|(name, _)| Cell::Text(name.clone().into())).collect();
-        let row = |row: usize| (row as u64 + 1, columns.iter().map(|(_, cells)| cells[row].clone()).collect());
+        let cell = |cells: &[Cell<'static>], row: usize| cells.get(row).cloned().unwrap_or_default();
+        let row = |row: usize| (row as u64 + 1, columns.iter().map(|(_, cells)| cell(cells, row)).collect());
         return Some([(1, names)].into_iter().chain((0..longest).map(row)).collect());
     }
-    // The object may contain settings beside the recording.
-    pairs.into_iter().find_map(|(_, value)| whole(value))
+    // The object may contain settings beside the recording, and several recordings, one below the other then.
+    let found: Vec<Rows> = pairs.into_iter().filter_map(|(_, value)| whole(value)).collect();
+    let names = found.iter().rev().max_by_key(|rows| rows.len())?.first()?.1.clone();
+    Some(found.into_iter().filter(|rows| rows.first().is_some_and(|(_, first)| *first == names)).flatten().collect())
+}
+
+/// Replaces the words for numbers that are not finite, which Python writes and JSON does not have.
+fn with_null(text: &str) -> Cow<'_, str> {
+    const WORDS: [&str; 3] = ["NaN", "-Infinity", "Infinity"];
+    if !WORDS.iter().any(|word| text.contains(word)) {
+        return text.into();
+    }
+    let (mut out, mut rest, mut is_quoted) = (String::with_capacity(text.len()), text, false);
+    while let Some(next) = rest.chars().next() {
+        let word = WORDS.iter().find(|word| !is_quoted && rest.starts_with(**word));
+        let (taken, written) = match (word, next) {
+            (Some(word), _) => (word.len(), "null"),
+            (None, '\\') if is_quoted => {
+                let escaped = rest.chars().take(2).map(char::len_utf8).sum();
+                (escaped, &rest[..escaped])
+            }
+            _ => (next.len_utf8(), &rest[..next.len_utf8()]),
+        };
+        is_quoted ^= next == '"';
+        out.push_str(written);
+        rest = &rest[taken..];
+    }
+    out.into()
+}
+
+const fn is_cell(value: &Json) -> bool {
+    matches!(value, Json::Cell(_))
 }
 
 /// Returns the cells of a column; none if it is something else.

@@ -1,5 +1,6 @@
-//! LabVIEW measurement files without a column of times, which follow from `X0` and `Delta_X` in the header of each segment.
+//! LabVIEW measurement files. Without a column of times, these follow from `X0` and `Delta_X` in the header of each segment.
 
+use crate::error::Fault;
 use crate::import::bytes::{Cell, Rows};
 use crate::import::words::{DecimalMark, number, units};
 
@@ -10,15 +11,50 @@ const SEGMENT: &str = "Channels";
 /// Number of decimals of a time whose step is written with an exponent.
 const MOST_DECIMALS: usize = 12;
 
+/// Columns of times in a file.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Times {
+    /// None.
+    Computed,
+    /// The first column.
+    One,
+    /// One before the column of each channel.
+    Multi,
+}
+
 /// Returns the names and rows of such a file, each row after its time, and its decimal mark; `None` if the file is of another kind.
-pub(crate) fn rows<'a>(lines: &[(u64, &'a str)]) -> Option<(Rows<'a>, DecimalMark)> {
+///
+/// # Errors
+/// The line and the fault, if channels of a segment have different steps.
+pub(crate) fn rows<'a>(lines: &[(u64, &'a str)]) -> Result<Option<(Rows<'a>, DecimalMark)>, (u64, Fault)> {
+    let conflict = lines.iter().find_map(|(number, line)| {
+        let mut steps =
+            line.split(if line.contains('\t') { '\t' } else { ',' }).map(str::trim).filter(|cell| !cell.is_empty());
+        let first = (steps.next() == Some("Delta_X")).then(|| steps.next())??;
+        Some((*number, steps.find(|step| *step != first)?, first))
+    });
+    // With columns of times, the steps do not matter.
+    let is_computed =
+        lines.iter().any(|(_, line)| line.strip_prefix("X_Columns").is_some_and(|rest| rest.trim() == "No"));
+    match (found(lines), conflict.filter(|_| is_computed)) {
+        (Some(_), Some((number, step, first))) => {
+            Err((number, Fault::new(format!("one step between rows, {first}, for all channels"), step)))
+        }
+        (found, _) => Ok(found),
+    }
+}
+
+fn found<'a>(lines: &[(u64, &'a str)]) -> Option<(Rows<'a>, DecimalMark)> {
     let first = lines.first()?.1.trim_start_matches('\u{feff}').trim_start();
     let end = lines.iter().position(|(_, line)| line.starts_with(END)).filter(|_| first.starts_with(MAGIC))?;
     let separator = if value(&lines[..end], "Separator") == Some("Comma") { ',' } else { '\t' };
     let keys = |key| lines[..end].iter().find_map(|(_, line)| line.strip_prefix(key)?.strip_prefix(separator));
-    if keys("X_Columns")?.trim() != "No" {
-        return None;
-    }
+    let times = match keys("X_Columns")?.trim() {
+        "No" => Times::Computed,
+        "One" => Times::One,
+        "Multi" => Times::Multi,
+        _ => return None,
+    };
     let is_comma = keys("Decimal_Separator").is_some_and(|mark| mark.trim() == ",");
     let decimal = if is_comma { DecimalMark::Comma } else { DecimalMark::Point };
     let (mut out, mut segment) = (Rows::new(), Segment::default());
@@ -34,12 +70,15 @@ pub(crate) fn rows<'a>(lines: &[(u64, &'a str)]) -> Option<(Rows<'a>, DecimalMar
             segment.take(&cells);
         } else if !has_names {
             has_names = true;
-            // Later segments have the names of the first.
-            if out.is_empty() {
-                out.push((line, segment.names(&cells)));
+            let names = segment.names(&cells, times);
+            // Later segments repeat the names of the first, or are another table.
+            if out.first().is_none_or(|(_, first)| *first != names) {
+                out.push((line, names));
             }
-        } else {
+        } else if times == Times::Computed {
             out.push((line, segment.row(&cells, decimal)?));
+        } else {
+            out.push((line, cells.iter().map(|cell| Cell::text(cell)).collect()));
         }
     }
     Some((out, decimal))
@@ -66,12 +105,22 @@ impl<'a> Segment<'a> {
     }
 
     /// Returns the names of the columns, each with its unit from the header.
-    fn names(&self, cells: &[&'a str]) -> Vec<Cell<'a>> {
-        let channel = |(place, name): (usize, &&'a str)| match self.units.get(place) {
-            Some(unit) if units::is_unit(unit) && !name.ends_with(')') => Cell::Text(format!("{name} ({unit})").into()),
-            _ => Cell::text(name),
+    fn names(&self, cells: &[&'a str], times: Times) -> Vec<Cell<'a>> {
+        let channel = |(place, name): (usize, &&'a str)| {
+            let unit = match times {
+                Times::Multi if place % 2 == 1 => return Cell::text(name),
+                Times::Multi => self.units.get(place / 2),
+                Times::Computed | Times::One => self.units.get(place),
+            };
+            match unit {
+                Some(unit) if units::is_unit(unit) && !name.ends_with(')') => {
+                    Cell::Text(format!("{name} ({unit})").into())
+                }
+                _ => Cell::text(name),
+            }
         };
-        [Cell::text("Time (s)")].into_iter().chain(cells[1..].iter().enumerate().map(channel)).collect()
+        let first = if times == Times::Computed { "Time (s)" } else { cells[0] };
+        [Cell::text(first)].into_iter().chain(cells[1..].iter().enumerate().map(channel)).collect()
     }
 
     /// Returns the next row, after its time; `None` if the header has no step between rows.

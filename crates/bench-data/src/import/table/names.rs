@@ -7,7 +7,7 @@ use crate::import::table::data::{Data, Shape};
 use crate::import::table::grid::{Grid, MONITOR_CLOCK, Separator, split};
 use crate::import::table::value::{number_of, value_of};
 use crate::import::words::names::{self, is_quantity};
-use crate::import::words::{DecimalMark, Value, is_stamp};
+use crate::import::words::{DecimalMark, Role, Value, is_stamp};
 
 /// Number of rows with which a line of numbers is compared.
 const ROWS_BELOW: usize = 20;
@@ -34,6 +34,9 @@ impl Data {
     pub(crate) fn heading_cells(&self, grid: &Grid, row: usize) -> Option<Vec<String>> {
         let width = self.shape.width;
         let mut cells = cells_above(grid, row)?;
+        if let ([line], true) = (&cells[..], width > 1) {
+            cells = split_otherwise(line, width).unwrap_or(cells);
+        }
         if cells.len() != width {
             cells = joined_brackets(cells);
         }
@@ -85,15 +88,17 @@ impl Data {
         let counts = &names[usize::from(names.first().is_some_and(String::is_empty))..];
         let first = counts.first().and_then(|count| count.parse::<usize>().ok()).filter(|first| *first < 2)?;
         let is_counted = counts.iter().zip(first..).all(|(count, expected)| *count == expected.to_string());
-        if cells.len() != self.shape.width || counts.len() < 3 || !is_counted {
+        if cells.len() != self.shape.width || counts.len() < 2 || !is_counted {
             return None;
         }
+        // Two numbers may also be the first row.
+        let times = if counts.len() < 3 { 20.0 } else { 2.0 };
         let far = |place: usize| {
             let name = names[place].parse::<f64>().ok()?;
             let below = (data..grid.len())
                 .take(ROWS_BELOW)
                 .filter_map(|row| grid.cells(row).get(place).and_then(|cell| number_of(cell, decimal)).map(f64::abs));
-            Some(below.fold(f64::INFINITY, f64::min) > 2.0 * name.max(1.0))
+            Some(below.fold(f64::INFINITY, f64::min) > times * name.max(1.0))
         };
         (0..names.len()).any(|place| far(place) == Some(true)).then_some(names)
     }
@@ -128,8 +133,15 @@ impl Data {
 /// Returns the cells of a line above the data, or of a comment; the clock of a serial monitor has a name.
 fn cells_above(grid: &Grid, row: usize) -> Option<Vec<String>> {
     let mut cells: Vec<String> = match (grid.comment(row), grid) {
-        (Some(comment), Grid::Text { separator, .. }) if !comment.contains('=') => {
-            split(comment, *separator).into_iter().map(Cow::into_owned).collect()
+        (Some(comment), Grid::Text { lines, separator, .. }) if !comment.contains('=') => {
+            let mut cells: Vec<String> = split(comment, *separator).into_iter().map(Cow::into_owned).collect();
+            // `% Strain, R, Time`: a comment, or percent.
+            if let Some(first) =
+                cells.first_mut().filter(|first| lines[row].1.trim_start().starts_with('%') && is_strain(first))
+            {
+                first.insert_str(0, "% ");
+            }
+            cells
         }
         (Some(_), _) => return None,
         (None, _) => grid.cells(row).iter().map(Cell::to_string).collect(),
@@ -138,6 +150,19 @@ fn cells_above(grid: &Grid, row: usize) -> Option<Vec<String>> {
         MONITOR_CLOCK.clone_into(clock);
     }
     Some(cells)
+}
+
+/// Splits a line of names with another separator than that of the data.
+fn split_otherwise(line: &str, width: usize) -> Option<Vec<String>> {
+    let cells = |mark: char| line.split(mark).map(|cell| cell.trim().to_owned()).collect::<Vec<_>>();
+    let is_fit = |cells: &Vec<String>| cells.len() == width && cells.iter().any(|cell| is_quantity(cell));
+    [';', ',', '\t', '|'].into_iter().map(cells).find(is_fit)
+}
+
+/// True if a heading is that of a strain without a unit.
+fn is_strain(heading: &str) -> bool {
+    let (name, unit) = names::take_apart(heading);
+    unit.is_none() && matches!(names::role(&name, None), Some((Role::Strain, _)))
 }
 
 /// True if a cell may be a name: it is neither a number nor a date.

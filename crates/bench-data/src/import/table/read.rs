@@ -1,3 +1,4 @@
+use crate::error::{Fault, quote};
 use crate::import::bytes::bounds::check_cells;
 use crate::import::bytes::text::lines;
 use crate::import::bytes::{Cell, Cells, Contents, NamedSheets, RawColumn, open};
@@ -13,7 +14,9 @@ use crate::import::table::rate::rate;
 use crate::import::table::records::{self, Records};
 use crate::import::table::transposed::exchanged;
 use crate::import::table::unit_column;
+use crate::import::table::value::number_of;
 use crate::import::table::{interleaved, json, labview};
+use crate::import::words::names::is_quantity;
 use crate::import::words::{DecimalMark, has_groups};
 
 /// Reads a file of any kind: text, XLSX and its relatives, Parquet, each also in gzip. `name` is its name in messages.
@@ -28,6 +31,7 @@ pub fn read_table(bytes: Vec<u8>, name: &str, options: &ReadOptions) -> Result<T
         Contents::Columns(columns, format) => of_columns(columns, name, format),
     };
     fractions::join(&mut table);
+    fractions::join_dates(&mut table);
     unit_column::take(&mut table);
     options.rows.iter().try_for_each(|filter| table.keep(filter))?;
     table.layout.format.insert_str(0, &wrappings);
@@ -44,7 +48,8 @@ fn of_text(text: &str, encoding: &'static str, name: &str, options: &ReadOptions
     let below = &lines[lines.partition_point(|(number, _)| *number <= skip as u64)..];
     let monitor = is_monitor(below.iter().take(SAMPLE).map(|(_, line)| *line));
     let layout = Layout { format: "text".to_owned(), encoding: Some(encoding), ..Layout::default() };
-    if let Some((rows, decimal)) = labview::rows(&lines) {
+    let labview = labview::rows(&lines).map_err(|(line, fault)| ImportError::content(name, line, fault))?;
+    if let Some((rows, decimal)) = labview {
         let layout = Layout { format: "LabVIEW measurement".to_owned(), decimal, ..layout };
         return of_lines(name, &Grid::Rows(rows), layout, skip);
     }
@@ -126,9 +131,22 @@ fn of_grid(file: &str, grid: &Grid, header: Header, layout: Layout) -> Result<Ta
     for row in header.first_row..grid.len() {
         let line = grid.cells(row);
         if row >= end || grid.comment(row).is_some() || Shape::of(&line, layout.decimal).numbers == 0 {
+            if header.header_lines == 1 && names_others(&line, &header.headings) {
+                let names = header.headings.join(", ");
+                let found = line.iter().map(Cell::to_string).collect::<Vec<_>>().join(", ");
+                let expected = format!("columns {names}, as above");
+                let fault = Fault::new(expected, format!("{}: make files of their own of such parts", quote(&found)));
+                return Err(ImportError::content(file, grid.line(row), fault));
+            }
             layout.text_lines += 1;
             layout.first_text_line.get_or_insert(grid.line(row));
             continue;
+        }
+        let width = header.shape.width;
+        if let Some(beyond) = line.iter().skip(width).find(|cell| number_of(cell, layout.decimal).is_some()) {
+            let found = format!("{}, the first beyond them {}", line.len(), quote(&beyond.to_string()));
+            let fault = Fault::new(format!("{width} cells, as in most lines"), found);
+            return Err(ImportError::content(file, grid.line(row), fault));
         }
         widths.push(line.len());
         if !layout.has_groups {
@@ -150,15 +168,27 @@ fn of_grid(file: &str, grid: &Grid, header: Header, layout: Layout) -> Result<Ta
     Ok(Table { file: file.to_owned(), layout, metadata: header.metadata, columns, lines: numbers })
 }
 
-/// Returns the first line after the data: text, sums with a word before them, or a truncated line.
+/// True if a line names columns, at least one of them a quantity, and not those of the header: another table begins.
+fn names_others(line: &[Cell], headings: &[String]) -> bool {
+    let names: Vec<String> = line.iter().map(Cell::to_string).collect();
+    names.len() >= headings.len()
+        && names.iter().zip(headings).any(|(name, heading)| name != heading && !heading.is_empty() && is_quantity(name))
+}
+
+/// Returns the first line after the data: text, sums after a word, or a truncated line.
 fn end_of_data(grid: &Grid, header: &Header, decimal: DecimalMark) -> usize {
     let is_behind = |row: &usize| {
-        let shape = Shape::of(&grid.cells(*row), decimal);
+        let cells = grid.cells(*row);
+        let shape = Shape::of(&cells, decimal);
+        let is_sum = shape.is_worded(header.shape)
+            && cells
+                .first()
+                .is_some_and(|cell| matches!(cell, Cell::Text(text) if text.starts_with(char::is_alphabetic)));
         let is_cut = *row + 1 == grid.len()
             && matches!(grid, Grid::Text { is_open: true, .. })
             && shape.width < header.shape.width
             && shape.numbers < header.shape.numbers;
-        grid.comment(*row).is_some() || shape.numbers == 0 || shape.is_worded(header.shape) || is_cut
+        grid.comment(*row).is_some() || shape.numbers == 0 || is_sum || is_cut
     };
     (header.first_row..grid.len()).rev().take_while(is_behind).last().unwrap_or(grid.len())
 }

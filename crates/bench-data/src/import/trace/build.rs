@@ -56,7 +56,7 @@ impl Plan {
             let is_same = self.decision.is_one_clock() && align == Align::None;
             let values = work.beside(timed, is_same, align, &readings, zero.as_ref())?;
             if !is_same || self.recipe.fold_polarity {
-                work.mention_unreached(timed.values.place.file, &values);
+                work.check_reach(timed.values.place.file, &values)?;
             }
             columns.push((timed.values.role, values));
         }
@@ -193,11 +193,18 @@ impl Work<'_> {
         Ok(series.at(&readings.time))
     }
 
-    fn mention_unreached(&mut self, file: usize, values: &[f64]) {
+    /// Refuses a reference of another time than all readings, and mentions one that does not reach some of them.
+    fn check_reach(&mut self, file: usize, values: &[f64]) -> Result<(), ImportError> {
         let unknown = values.iter().filter(|value| value.is_nan()).count();
+        if unknown == values.len() {
+            let what = "the reference has no value at the time of any reading: the clocks differ";
+            let answers = ["--align SECONDS, what to add to the reference's clock", "--align motion"];
+            return Err(ImportError::question(&all_files(self.tables), what, answers.map(str::to_owned)));
+        }
         if unknown > 0 {
             self.remark(file, format!("no reference within reach of {unknown} of {} readings", values.len()));
         }
+        Ok(())
     }
 
     fn by_motion(&mut self, readings: &Series, reference: &Series) -> Result<f64, ImportError> {

@@ -37,5 +37,15 @@ pub(crate) fn is_stretch_ratio(name: &str) -> bool {
 /// True if a name denotes a change relative to the resistance at rest, `dR/R0`, not a ratio, `R/R0`.
 pub(crate) fn is_change(name: &str) -> bool {
     let folded = folded(name);
-    folded.starts_with(['d', 'δ']) || folded.contains("change") || folded.contains("-r0")
+    let plain: String = folded.chars().filter(|c| !c.is_whitespace()).collect();
+    folded.starts_with(['d', 'δ']) || folded.contains("change") || plain.contains("-r0") || plain.ends_with("r0-1")
+}
+
+/// True if a resistance's name denotes its change since rest, `ΔR`.
+pub(crate) fn is_difference(name: &str) -> bool {
+    let folded = folded(name);
+    let letters: String = folded.chars().filter(|c| c.is_alphanumeric()).collect();
+    let is_delta = |rest: &str| rest.starts_with('r') && !rest.starts_with("ro");
+    let behind = ["delta", "diff", "δ"].iter().find_map(|start| letters.strip_prefix(start));
+    behind.is_some_and(is_delta) || letters == "dr" || letters.starts_with("dresist") || folded.contains("change")
 }

@@ -69,6 +69,37 @@ fn is_sure_unit(name: &str, unit: &str) -> bool {
     }
 }
 
+/// Returns the unit of a quantity that stands anywhere in a heading as a word of its own: `resistance_kohm_1`, `StrainPercent`; none if
+/// there are two. A letter is no such word.
+pub(crate) fn unit_within(role: Role, heading: &str) -> Option<String> {
+    let is_mark = |c: char| !c.is_alphanumeric() && !matches!(c, '%' | '‰' | '°');
+    let is_unit = |word: &&str| {
+        let is_letter = word.chars().count() == 1 && word.starts_with(char::is_alphabetic);
+        let known = units::unit(role, word).filter(|unit| unit.scale != units::Scale::Stamp);
+        let lower = word.to_lowercase();
+        known.is_some()
+            && !is_letter
+            && !is_index(word)
+            && !SHORT_WORDS.contains(&lower.as_str())
+            && !is_among(WORDS, &lower)
+    };
+    let heading = heading.strip_prefix("% ").unwrap_or(heading);
+    let mut found: Vec<&str> = heading.split(is_mark).filter(is_unit).collect();
+    if found.is_empty() {
+        found = heading.split(is_mark).flat_map(capitalised).filter(is_unit).collect();
+    }
+    found.dedup();
+    if let [only] = found[..] { Some(only.to_owned()) } else { None }
+}
+
+/// Splits a word before its capital letters: `StrainPercent`.
+fn capitalised(word: &str) -> Vec<&str> {
+    let places = word.char_indices().filter(|(place, c)| *place > 0 && c.is_uppercase()).map(|(place, _)| place);
+    let starts: Vec<usize> = std::iter::once(0).chain(places).collect();
+    let ends = starts[1..].iter().copied().chain([word.len()]);
+    starts.iter().zip(ends).map(|(start, end)| &word[*start..end]).collect()
+}
+
 /// Returns the end of a name that may be a unit or a part of the name: `res_k`, `strain_p`, `time_m`.
 pub(crate) fn doubtful_unit(role: Role, heading: &str) -> Option<&str> {
     const DOUBTFUL: [(Role, &[&str]); 4] = [
@@ -77,6 +108,9 @@ pub(crate) fn doubtful_unit(role: Role, heading: &str) -> Option<&str> {
         (Role::Ratio, &["p", "pc"]),
         (Role::Strain, &["p", "pc", "m", "u", "µ"]),
     ];
+    if heading.starts_with("% ") {
+        return Some("%");
+    }
     let (_, end) = heading.trim().rsplit_once(['_', ' ', '-', '.'])?;
     let (_, ends) = DOUBTFUL.iter().find(|(of, _)| *of == role.quantity())?;
     ends.contains(&end.to_lowercase().as_str()).then_some(end)
@@ -155,9 +189,17 @@ fn is_uncertainty(name: &str) -> bool {
     words.next_back().is_some_and(|last| UNCERTAINTIES.contains(&last)) && words.next().is_some()
 }
 
+/// True if a name denotes how fast a quantity changes, or contains one by chance: `strain_rate`, `Constraint`.
+fn is_another(name: &str) -> bool {
+    const RATES: [&str; 5] = ["rate", "speed", "velocity", "geschwindigkeit", "vitesse"];
+    let folded = folded(name);
+    let mut words = folded.split(|c: char| !c.is_alphanumeric());
+    words.any(|word| RATES.iter().any(|rate| word.ends_with(rate))) || folded.contains("constrain")
+}
+
 /// Returns the role that a column's name and unit suggest, if any.
 pub(crate) fn role(name: &str, unit: Option<&str>) -> Option<(Role, Sureness)> {
-    if is_uncertainty(name) {
+    if is_uncertainty(name) || is_another(name) {
         return None;
     }
     let fits = |role: Role| {
@@ -225,6 +267,9 @@ mod tests {
         for name in ["strain_sd", "angle_sd", "Strain error", "R std", "displacement.err"] {
             assert_eq!(role(name, None), None, "{name}");
         }
+        for name in ["strain_rate", "Strain rate", "Dehnungsgeschwindigkeit", "StrainRate", "Constraint"] {
+            assert_eq!(role(name, None), None, "{name}");
+        }
         assert!(role("strain", None).is_some() && role("angle_deg", None).is_some() && role("std", None).is_none());
     }
 
@@ -266,6 +311,30 @@ mod tests {
         ];
         for (heading, name, unit) in cases {
             assert_eq!(take_apart(heading), (name.to_owned(), unit.map(str::to_owned)), "{heading}");
+        }
+    }
+
+    #[test]
+    fn a_unit_may_stand_anywhere_in_a_heading() {
+        let cases = [
+            (Role::Resistance, "resistance_kohm_1", Some("kohm")),
+            (Role::Resistance, "resistance.kohm", Some("kohm")),
+            (Role::Resistance, "Resistance..kOhm.", Some("kOhm")),
+            (Role::Resistance, "kohm", Some("kohm")),
+            (Role::Resistance, "R_k", None),
+            (Role::Resistance, "R_min", None),
+            (Role::Resistance, "ohm or kohm", None),
+            (Role::Strain, "StrainPercent", Some("Percent")),
+            (Role::Strain, "strain %", Some("%")),
+            (Role::Strain, "strain_pct_cmd", Some("pct")),
+            (Role::Strain, "strain_1", None),
+            (Role::Strain, "strain ratio", None),
+            (Role::Time, "time_ms_1", Some("ms")),
+            (Role::Time, "timestamp", None),
+            (Role::Displacement, "position in counts", None),
+        ];
+        for (role, heading, unit) in cases {
+            assert_eq!(unit_within(role, heading).as_deref(), unit, "{heading}");
         }
     }
 

@@ -73,8 +73,10 @@ pub(crate) fn is_missing(text: &str, own: &[String]) -> bool {
 /// Returns the value of a cell, its number times 10^`shift`.
 pub(crate) fn value(text: &str, mark: DecimalMark, shift: i32, own: &[String]) -> Value {
     let text = text.trim();
+    // An overload is a number of the instrument, in whatever unit.
+    let is_overload = |value: f64| number(text, mark, 0).unwrap_or(value).abs() >= SCPI_OVERLOAD;
     match number(text, mark, shift) {
-        Some(value) if value.is_finite() && value.abs() < SCPI_OVERLOAD && !own.iter().any(|own| own == text) => {
+        Some(value) if value.is_finite() && !is_overload(value) && !own.iter().any(|own| own == text) => {
             Value::Number(value)
         }
         Some(_) => Value::Missing,
@@ -192,6 +194,9 @@ mod tests {
             ["OVLD", "+OL", "O.L", "OVERLOAD", " nan ", "", "---", "#N/A", "9.91E37", "-9.9e+37", "inf", "Over Range"]
         {
             assert_eq!(value(text, DecimalMark::Point, 0, &[]), Value::Missing, "{text}");
+        }
+        for shift in [-6, -2, 3] {
+            assert_eq!(value("9.9E37", DecimalMark::Point, shift, &[]), Value::Missing);
         }
         assert_eq!(value("hold", DecimalMark::Point, 0, &[]), Value::Text);
         assert_eq!(value("hold", DecimalMark::Point, 0, &["hold".into()]), Value::Missing);

@@ -2,6 +2,10 @@ use chrono::{Datelike, NaiveDate};
 
 const SECOND: i128 = 1_000_000_000;
 pub(crate) const DAY: i128 = 86_400 * SECOND;
+/// Latest time of day, which may be west of Greenwich, in UTC.
+const LONGEST_DAY: i128 = 2 * DAY;
+/// Most hours or minutes of an elapsed time.
+const MOST_ELAPSED: i128 = 9999;
 
 /// Order of the parts of a date.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -37,7 +41,9 @@ pub(crate) struct Stamp {
 }
 
 /// Labels of whole and of fractional seconds, and the number of digits of the fraction.
-pub(crate) const SPLIT_SECONDS: [(&str, &str, usize); 9] = [
+pub(crate) const SPLIT_SECONDS: [(&str, &str, usize); 11] = [
+    ("sec", "ms", 3),
+    ("sec", "msec", 3),
     ("sec", "nanosec", 9),
     ("sec", "nsec", 9),
     ("secs", "nsecs", 9),
@@ -55,6 +61,15 @@ pub(crate) fn stamp(text: &str, order: Order) -> Option<Stamp> {
     if !may_be_stamp(text.as_bytes()) {
         return None;
     }
+    // pandas writes elapsed times as `0 days 00:00:00.050000`.
+    if let Some((days, time)) = text.split_once(" days ") {
+        let days: u16 = days.parse().ok()?;
+        return Some(Stamp {
+            nanoseconds: i128::from(days) * DAY + time_of_day(time)?,
+            has_date: false,
+            has_time: true,
+        });
+    }
     let (date, time) = date_and_time(text);
     let days = match date {
         Some(date) => i128::from(days(date.trim_end_matches(','), order)?),
@@ -64,6 +79,9 @@ pub(crate) fn stamp(text: &str, order: Order) -> Option<Stamp> {
         Some(time) => time_of_day(time.trim())?,
         None => 0,
     };
+    if date.is_some() && seconds > LONGEST_DAY {
+        return None;
+    }
     Some(Stamp { nanoseconds: days * DAY + seconds, has_date: date.is_some(), has_time: time.is_some() })
 }
 
@@ -125,18 +143,22 @@ fn time_of_day(time: &str) -> Option<i128> {
         (_, Some(clock)) => (clock.trim(), Some(12)),
         _ => (lower.as_str(), None),
     };
-    let (hours, minutes, seconds, thousandths) = match clock.split(':').collect::<Vec<_>>()[..] {
-        [minutes, seconds] if seconds.contains(['.', ',']) => ("0", minutes, seconds, ""),
-        [hours, minutes] => (hours, minutes, "0", ""),
-        [hours, minutes, seconds] => (hours, minutes, seconds, ""),
-        [hours, minutes, seconds, part] if part.len() == 3 && seconds.len() == 2 => (hours, minutes, seconds, part),
+    // Elapsed times may have more hours than a day, or more minutes than an hour.
+    let (hours, minutes, seconds, thousandths, most) = match clock.split(':').collect::<Vec<_>>()[..] {
+        [minutes, seconds] if seconds.contains(['.', ',']) => ("0", minutes, seconds, "", (0, MOST_ELAPSED)),
+        [hours, minutes] => (hours, minutes, "0", "", (24, 59)),
+        [hours, minutes, seconds] if half.is_none() => (hours, minutes, seconds, "", (MOST_ELAPSED, 59)),
+        [hours, minutes, seconds] => (hours, minutes, seconds, "", (24, 59)),
+        [hours, minutes, seconds, part] if part.len() == 3 && seconds.len() == 2 => {
+            (hours, minutes, seconds, part, (24, 59))
+        }
         _ => return None,
     };
     let mut hours: i128 = hours.parse().ok()?;
-    let minutes: i128 = Some(minutes).filter(|part| part.len() <= 2)?.parse().ok()?;
+    let minutes: i128 = minutes.parse().ok()?;
     let thousandths: i128 = if thousandths.is_empty() { 0 } else { thousandths.parse().ok()? };
     let nanoseconds = nanoseconds(seconds)? + thousandths * SECOND / 1000;
-    if hours > 24 || minutes > 59 || nanoseconds >= 61 * SECOND {
+    if hours > most.0 || minutes > most.1 || nanoseconds >= 61 * SECOND {
         return None;
     }
     if let Some(half) = half {
@@ -243,6 +265,11 @@ mod tests {
         assert_eq!(seconds("05/01/2024 10:30:01:500", Order::Mdy), moment);
         assert_eq!(seconds("01:30.5", Order::Iso), Some(90.5));
         assert_eq!(seconds("01:30", Order::Iso), Some(5400.0));
+        assert_eq!(seconds("61:30.5", Order::Iso), Some(3690.5));
+        assert_eq!(seconds("25:00:01", Order::Iso), Some(90_001.0));
+        assert_eq!(seconds("25:00:01 pm", Order::Iso), None);
+        assert_eq!(seconds("61:30", Order::Iso), None);
+        assert_eq!(seconds("1 days 00:00:01.050000", Order::Iso), Some(86_401.05));
     }
 
     #[test]

@@ -37,6 +37,7 @@ int main(void)
     failures += ohmstrain_rest(&state, OHMSTRAIN_CHANNELS, 1.0f) != OHMSTRAIN_ERR_ARGUMENT;
 #ifndef OHMSTRAIN_SELFTEST_QUIET
     printf("%d rows, largest difference %.2g sd (%.2g allowed), %d failures\n", VECTORS, (double)largest, (double)TOLERANCE_SD, failures);
+    printf("%s\n", failures || !(largest <= TOLERANCE_SD) ? "self-test FAILED" : "self-test passed");
 #endif
     return failures || !(largest <= TOLERANCE_SD);
 }
