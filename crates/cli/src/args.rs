@@ -103,14 +103,14 @@ pub enum Command {
     /// Show the page for a browser, from this computer to this computer
     #[command(before_help = "Example: ohmstrain serve --port 8476")]
     Serve(ServeArgs),
-    /// Say what stands in a lab's files, and how to import them
+    /// Describe a lab's files, and how to import them
     #[command(before_help = "Example: ohmstrain inspect rig.csv --gauge-length-mm 40")]
     Inspect(InspectArgs),
     /// Make a trace of a lab's files
     #[command(before_help = "Example: ohmstrain import rig.csv --gauge-length-mm 40 -o trace.csv")]
     Import(ImportArgs),
     /// Say what a recording should contain, and what sampling and converter will be worth
-    #[command(before_help = "Example: ohmstrain plan --material ecoflex-00-30")]
+    #[command(before_help = "Example: ohmstrain plan --material representative")]
     Plan(PlanArgs),
     /// Pace a person through a protocol while readings are recorded: the strain is known where the body is held
     #[command(

@@ -13,8 +13,8 @@ use crate::whole_file::is_stdin;
 pub fn refuse_results(path: &Path) -> Result<(), CliError> {
     let Some(head) = std::fs::File::open(path).ok().filter(|_| path.is_file()).and_then(head) else { return Ok(()) };
     let header = head.lines().next().unwrap_or_default();
-    let what = if Kind::Prior.wrote(&head, &[]) {
-        "is a prior: give it to `calibrate --prior`"
+    let what = if let Some(what) = sensor_file::other_kind(&head) {
+        what
     } else if sensor_file::is_hand(&head) {
         sensor_file::A_HAND
     } else if sensor_file::is_one(head.as_bytes()) {

@@ -3,6 +3,7 @@ use std::path::Path;
 use ohmstrain::{EstimatorKind, Sensor, SensorParams};
 
 use crate::error::CliError;
+use crate::output::Kind;
 use crate::whole_file;
 
 /// Message for a file that describes a hand where a sensor is expected.
@@ -20,11 +21,25 @@ pub fn read(path: &Path, estimator: Option<EstimatorKind>) -> Result<Sensor, Cli
     if is_hand(&text) {
         return Err(CliError::Input(format!("{name} {A_HAND}")));
     }
+    if let Some(what) = other_kind(&text) {
+        return Err(CliError::Input(format!("{name} {what}")));
+    }
     let sensor = match estimator {
         Some(kind) => Sensor::from_toml_for(&text, kind),
         None => Sensor::from_toml(&text),
     };
     sensor.map_err(|error| CliError::Input(error.in_file(&name)))
+}
+
+/// Returns what to do with a file of this program that is neither a sensor nor a hand.
+pub fn other_kind(head: &str) -> Option<&'static str> {
+    let kinds = [
+        (Kind::Prior, "is a prior: give it to `calibrate --prior`"),
+        (Kind::State, "is a filter's state: give it to `filter --resume`"),
+        (Kind::Fusion, "is a fusion of channels: give the hand.toml beside it to `hand`, `smooth` or `live`"),
+        (Kind::Protocol, "is a protocol: give it to `record`"),
+    ];
+    kinds.into_iter().find(|(kind, _)| kind.wrote(head, &[])).map(|(_, what)| what)
 }
 
 /// True if these are the first bytes of a sensor's parameters or of a hand's description.

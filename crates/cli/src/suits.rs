@@ -3,13 +3,17 @@
 use ohmstrain::Interface::CommandLine;
 use ohmstrain::number::significant;
 use ohmstrain::trace::TraceFile;
-use ohmstrain::{Known, ReferenceDoubt, Sensor, UnitDoubt, unused_known};
+use ohmstrain::{Estimate, Flag, Known, ReferenceDoubt, Sensor, UnitDoubt, unused_known};
 
 use crate::error::CliError;
 use crate::messages::Messages;
 
 /// Number of readings at the start of a file that are checked before it is filtered.
 pub const FIRST_READINGS: usize = 100;
+/// Least number of rows whose steps are compared with those of the calibration.
+const FEWEST_TIMES: usize = 10;
+/// Multiple of the calibration's step beyond which times may be in milliseconds; a recording read less often has smaller ones.
+const FARTHER: f64 = 200.0;
 
 /// Refuses readings in another unit than the sensor's; `header` names the recording's header in messages.
 pub fn check_readings(
@@ -27,6 +31,51 @@ pub fn check_reference(recording: &TraceFile, sensor: &Sensor) -> Result<(), Cli
     let truth = (0..recording.trace.len()).map(|row| recording.truth(row));
     let refused = |doubt: ReferenceDoubt| CliError::Input(format!("{}: {}", recording.header, doubt.text(CommandLine)));
     sensor.check_reference(truth).map_err(refused)
+}
+
+/// Warns of rows so much farther apart than those of the calibration that their times may be milliseconds.
+pub fn warn_of_clock(header: &str, sensor: &Sensor, times_s: impl Iterator<Item = f64>, messages: &Messages) {
+    let recordings = &sensor.params().recordings;
+    let lasted_s: f64 = recordings.iter().map(|one| one.last_s - one.first_s).sum();
+    let rows: usize = recordings.iter().map(|one| one.rows).sum();
+    let times: Vec<f64> = times_s.take(FIRST_READINGS).collect();
+    let (Some(first), Some(last)) = (times.first(), times.last()) else { return };
+    let step_s = (last - first) / (times.len() - 1).max(1) as f64;
+    let usual_s = lasted_s / rows as f64;
+    if times.len() < FEWEST_TIMES || !(step_s > FARTHER * usual_s) {
+        return;
+    }
+    messages.warning(&format!(
+        "{header}: rows are {} s apart, {} s in the calibration: if `time_s` is in milliseconds, convert the recording with \
+         `ohmstrain import FILE --unit time=ms -o trace.csv`",
+        significant(step_s, 3),
+        significant(usual_s, 3)
+    ));
+}
+
+/// Rows that were used beyond the calibration.
+#[derive(Default)]
+pub struct Unlike {
+    rows: usize,
+    extrapolated: usize,
+}
+
+impl Unlike {
+    /// Counts rows.
+    pub fn see(&mut self, rows: &[Estimate]) {
+        self.rows += rows.len();
+        self.extrapolated += rows.iter().filter(|row| row.flags.has(Flag::Extrapolated)).count();
+    }
+
+    /// Warns if they are most of the rows.
+    pub fn warn(&self, file: &str, messages: &Messages) {
+        if self.rows >= FIRST_READINGS && 2 * self.extrapolated > self.rows {
+            let percent = 100 * self.extrapolated / self.rows;
+            messages.warning(&format!(
+                "{file}: {percent} % of the rows are flagged `extrapolated`: sensor or use are unlike those of the calibration"
+            ));
+        }
+    }
 }
 
 /// Returns the sensor for readings with or without temperatures; warns where intervals are wider without.

@@ -290,7 +290,7 @@ fn a_plan_says_what_recordings_tell_and_what_sampling_leaves() {
     }
     let text = bench.run(&["plan", "--sensor", "sensor.toml"]).ok();
     assert!(text.contains("to and fro, one speed") && text.contains("12 bits"), "{text}");
-    assert!(text.contains("No other tells more in less time: ") && text.contains("of the least error."), "{text}");
+    assert!(text.contains("Most informative for its duration: ") && text.contains("of the least error."), "{text}");
     let illustrative = bench.run(&["plan", "--material", "ecoflex-00-30"]).ok();
     assert!(illustrative.contains("an illustrative sensor (ecoflex-00-30)"), "{illustrative}");
 }

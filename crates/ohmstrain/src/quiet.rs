@@ -58,7 +58,7 @@ struct Hold {
 ///
 /// ```
 /// let quiet = ohmstrain::Quiet { from_s: 12.0, now_s: 42.1, strain: 0.031 };
-/// assert!(quiet.to_string().starts_with("30 s of quiet from t = 12 s that may be a rest"));
+/// assert!(quiet.to_string().starts_with("30 s of quiet readings from t = 12 s, which may be a rest"));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quiet {

@@ -103,5 +103,5 @@ def test_readings_that_hold_still_near_rest_may_be_a_rest_of_another_day():
     noise = np.random.default_rng(1).normal(0.0, 0.3, len(time_s))
     moving = 1.6 * held + 0.55 * held * np.sin(time_s)
     rest = {"time_s": time_s, "resistance_ohm": np.where(time_s < 60.0, moving, held + noise)}
-    with pytest.warns(oh.OhmstrainWarning, match=r"s of quiet from .* known=\[\(.*, 0\)\] tells it"):
+    with pytest.warns(oh.OhmstrainWarning, match=r"s of quiet readings from .* add known=\[\(.*, 0\)\]"):
         sensor.filter(rest)

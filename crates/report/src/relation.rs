@@ -8,6 +8,7 @@ use super::ink::Ink;
 use super::motion::movements;
 use super::recording::PlottedRecording;
 use super::thin::Point;
+use ohmstrain::Quantity;
 use ohmstrain::number::{plain, significant};
 
 /// Largest number of arrows on a plot.
@@ -40,7 +41,7 @@ pub fn hysteresis(recording: &PlottedRecording) -> Result<Figure, ReportError> {
     let fixed = recording.static_curve();
     chart.curve(Ink::STATIC, "static calibration: cubic", fixed.into_iter().map(|(x, y)| (shown(x), y)));
     if let Some(border) = recording.law.static_border() {
-        chart.vertical(Ink::BOUND, "static border", shown(border));
+        chart.vertical(Ink::BOUND, "peak of the gauge curve", shown(border));
     }
     let note = "Colours are the course of time, arrows the direction of movement. A static calibration is one line through \
                 this figure; how far the loop departs from it sideways is its error.";
@@ -80,14 +81,18 @@ pub fn gauge(recording: &PlottedRecording) -> Result<Figure, ReportError> {
     let border = recording.law.static_border();
     let beyond = match border {
         Some(border) => {
-            chart.vertical(Ink::BOUND, "static border", recording.shown(border));
-            format!("Beyond {} one relaxed reading belongs to two strains.", recording.with_unit(border))
+            chart.vertical(Ink::BOUND, "peak of the gauge curve", recording.shown(border));
+            format!("Beyond {} one relaxed reading belongs to two values.", recording.with_unit(border))
         }
         None => "It has no peak in its range: every relaxed reading belongs to one value only.".into(),
     };
     let (low, high) = (recording.law.gauge(range.lower), recording.law.gauge(range.upper));
+    let factor = match recording.params.quantity {
+        Quantity::Strain => "Gauge factor dg/dε",
+        Quantity::AngleDeg => "Slope dg/dθ, per degree",
+    };
     let note = format!(
-        "Gauge factor dg/dε, fully relaxed: {} at {}, {} at {}, {} on average. {beyond}",
+        "{factor}, fully relaxed: {} at {}, {} at {}, {} on average. {beyond}",
         significant(recording.law.gauge_slope(range.lower), 3),
         recording.with_unit(range.lower),
         significant(recording.law.gauge_slope(range.upper), 3),

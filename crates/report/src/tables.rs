@@ -125,8 +125,8 @@ fn estimate_text(known: &Uncertainty, place: Option<usize>) -> String {
     let at = |values: &[f64]| place.and_then(|place| values.get(place).copied());
     match (at(&known.values), at(&known.standard_errors)) {
         (Some(value), Some(error)) if value.abs() > Z_95 * error => with_error(value, error),
-        (Some(value), Some(error)) => format!("not told ({})", with_error(value, error)),
-        _ => "not told".into(),
+        (Some(value), Some(error)) => format!("undetermined ({})", with_error(value, error)),
+        _ => "undetermined".into(),
     }
 }
 
@@ -163,7 +163,7 @@ fn law(params: &SensorParams, rest_reading: f64) -> Table {
     }
     rows.rest();
     Table::new(
-        "The law: what the filter runs with, which is held tame by a ridge, and what the recordings tell without it, value ± \
+        "The law: what the filter runs with, regularised by a ridge, and the fit without it, value ± \
          standard error",
         ["Parameter", "In the filter", "Told by the recordings", "Unit"],
         rows.rows,

@@ -110,15 +110,15 @@ fn long_holds(tau_s: f64, stats: &MotionStats) -> Option<String> {
     let (hold, relaxes) = (duration(2.0 * tau_s), duration(tau_s));
     Some(match stats.longest_hold_s {
         0.0 => format!(
-            "hold at the largest strain for {hold}, release, and rest for {hold}: what relaxes in {relaxes} shows in holds only"
+            "hold at the largest strain for {hold}, release, and rest for {hold}: a relaxation of {relaxes} shows in holds only"
         ),
         held if held < 2.0 * tau_s => {
             let held = duration(held);
             format!(
-                "hold at the largest strain for {hold}, release, and rest for {hold}: something relaxes in {relaxes}, holds were {held}"
+                "hold at the largest strain for {hold}, release, and rest for {hold}: a relaxation takes {relaxes}, the longest hold was {held}"
             )
         }
-        _ => format!("hold for {hold} at two strains between, once from below and once from above"),
+        _ => format!("hold for {hold} at two intermediate strains, approached once from each side"),
     })
 }
 
@@ -130,7 +130,7 @@ fn another_speed(stroke_s: f64) -> String {
 fn faster(range: StrainRange<f64>, stats: &MotionStats) -> String {
     let fastest_s = range.span() / stats.fastest_rate.max(f64::MIN_POSITIVE);
     let [fastest, faster] = [fastest_s, fastest_s / 2.0].map(duration);
-    format!("add strokes in {faster}, with as many rows a stroke: the fastest so far would take {fastest}")
+    format!("add full strokes of {faster}, sampled faster in proportion: the fastest so far would take {fastest}")
 }
 
 /// True if only one speed was recorded. The dash-pot is a jump of the reading that depends on the speed. At one speed it is a constant for

@@ -51,10 +51,10 @@ pub struct CalibrateArgs {
     /// Print what the recordings say about the law's parameters, which structures explain them, and what to record next
     #[arg(long)]
     pub explain: bool,
-    /// Print 95 % intervals of the law's parameters from N fits to blocks of the recordings drawn anew, 200 or more
+    /// Print 95 % intervals of the law's parameters from N fits to blocks of the recordings drawn anew; 200 or more are reliable
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000))]
     pub bootstrap: Option<u32>,
-    /// Print what the calibration came to as JSON
+    /// Print the result as JSON
     #[arg(long, conflicts_with_all = ["explain", "bootstrap"])]
     pub json: bool,
     /// Report and figures, of the first recording

@@ -9,7 +9,7 @@ use super::{Auto, ReplaceArgs, SetupArgs, UnitArgs, finite, name_of, positive};
 /// Flags that `filter`, `smooth` and `live` share.
 #[derive(Debug, ClapArgs)]
 pub struct EstimateArgs {
-    /// The sensor's parameters; for smooth and live also a hand.toml
+    /// The sensor's parameters; `smooth` and `live` accept a hand.toml, too
     #[arg(long, value_name = "sensor.toml")]
     pub sensor: PathBuf,
     /// Estimator: auto (the sensor file's choice), corrected, ekf, ukf, imm, sign-split, hypotheses
@@ -19,7 +19,7 @@ pub struct EstimateArgs {
     /// Strain (or angle) at the first row, if it is known; the body is at rest there
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = finite)]
     pub initial_strain: Option<f64>,
-    /// The strain (or angle) is known to be X at the first row from T seconds on, to SD (0.5 % of the limits); repeatable.
+    /// The strain (or angle) is known to be X at the first row from T seconds on, with standard deviation SD (default: 0.5 % of the range); repeatable.
     /// Estimates from there on follow (those of smooth before it, too): for seconds, and as far as known strains show an
     /// offset or another gain for an hour
     #[arg(long, value_name = "T:X[:SD]", allow_negative_numbers = true, value_parser = known)]
@@ -58,9 +58,9 @@ impl EstimateArgs {
 pub enum Without {
     /// The learned correction of the strain
     Correction,
-    /// Turning down readings that are far from those of the calibration, or come again and again
+    /// Rejection of implausible and stuck readings
     Plausibility,
-    /// The second look after a jump of the readings, which also follows the knowledge from before any reading,
+    /// The second hypothesis after a jump of the readings, restarted from the prior,
     /// and the way back to the state before a jump if readings jump back (smoothers never do)
     SecondLook,
     /// Wider intervals at a start, after a fault, and outside of the calibration
@@ -111,7 +111,7 @@ pub struct FilterArgs {
     /// Estimate every row from the readings up to S seconds after it, 0.5 for instance; rows come out that much later
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
     pub lag_s: Option<f64>,
-    /// Go on after lines that are none of a trace, as serial lines bring, before the header too; they are counted on stderr.
+    /// Skip lines that are not trace rows, such as a boot loader's, before the header too; they are counted on stderr.
     /// Where the device starts again (another header, or three rows in order behind times before theirs) so does the filter
     #[arg(long)]
     pub skip_bad: bool,

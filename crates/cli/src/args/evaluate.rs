@@ -33,7 +33,7 @@ pub struct EvaluateArgs {
     /// R₀ follows the readings, as in filter
     #[arg(long, value_name = "OHM|first:N|calibrated", allow_negative_numbers = true)]
     pub rest_resistance: Option<RestResistance>,
-    /// Score also what known strains bring, which the reference tells to the estimator before it is scored with it: one
+    /// Also score with known strains, taken from the reference: one
     /// every S seconds, and one near each end of the range, at the start
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
     pub known_every: Option<f64>,

@@ -14,7 +14,7 @@ pub struct HandArgs {
     /// Recording with a column of readings per joint, or - for stdin
     #[arg(default_value = "-")]
     pub trace_file: PathBuf,
-    /// Go on after lines that are none of a trace; they are counted on stderr. Where the device starts again so do the filters
+    /// Skip lines that are not trace rows; they are counted on stderr. Where the device starts again so do the filters
     #[arg(long)]
     pub skip_bad: bool,
     /// File to write instead of stdout

@@ -32,5 +32,5 @@ Keys: z  the sensor is at rest, unstretched: what it reads now is R0, and the st
       m  put a mark on the plot and into the record
       q  leave
 
-Lines that are none of a trace are counted and passed over. A port that goes away is waited for, and a clock that starts \
+Lines that are not trace rows are counted and skipped. A port that goes away is waited for, and a clock that starts \
 again, after a reset of the device, starts the filter again.";

@@ -19,7 +19,7 @@ use crate::readings::{late, no_row};
 use crate::run::{builder, builder_anew, rest_resistance};
 use crate::sensor_file;
 use crate::stream::{self, RowSource};
-use crate::suits::{self, FIRST_READINGS};
+use crate::suits::{self, FIRST_READINGS, Unlike};
 use crate::whole_file::is_stdin;
 
 /// Turns readings into strain as they arrive, and returns the number of rows. Memory does not grow with the recording.
@@ -54,7 +54,19 @@ pub fn run(args: &FilterArgs, messages: &Messages) -> Result<u64, CliError> {
     let writer = EstimateWriter::new(rows_out.open(grows)?, format, columns)?;
     let (watch, quiet) = (ValidityWatch::new(&sensor, None), QuietWatch::new(&sensor, None, &args.estimate.known));
     let file = rows.file().into();
-    let sink = Sink { messages, writer, watch, quiet, sensor, rest: None, file, header, live, early: vec![] };
+    let sink = Sink {
+        messages,
+        writer,
+        watch,
+        quiet,
+        sensor,
+        rest: None,
+        file,
+        header,
+        live,
+        early: vec![],
+        unlike: Unlike::default(),
+    };
     let skipped = Skipped::default();
     let stream = Stream { args, filter, sink, stored, times: None, restarted: false, skipped };
     let (written, state) = stream.run(rows)?;
@@ -175,6 +187,8 @@ impl<'a, W: io::Write + Send> Stream<'a, W> {
         let rest = self.sink.rest;
         if !self.sink.live {
             suits::check_readings(&self.sink.header, &self.sink.sensor, rest, known())?;
+            let times = first.iter().flatten().map(|row| row.row.time_s);
+            suits::warn_of_clock(&self.sink.header, &self.sink.sensor, times, self.sink.messages);
         }
         let mut first = first.into_iter();
         let streamed = loop {
@@ -186,6 +200,7 @@ impl<'a, W: io::Write + Send> Stream<'a, W> {
         self.skipped.say(self.sink.messages);
         if let (Ok(()), Some(times)) = (&streamed, self.times) {
             suits::warn_of_unused(&self.args.estimate.known, times, &self.sink.file, self.sink.messages);
+            self.sink.unlike.warn(&self.sink.file, self.sink.messages);
         }
         let saves = self.args.save_state.is_some() && streamed.is_ok();
         // Pending rows get their estimates whatever stopped the stream, and finished estimates remain valid.
@@ -286,10 +301,12 @@ struct Sink<'a, W: io::Write + Send> {
     live: bool,
     /// First known readings of a live stream.
     early: Vec<f64>,
+    unlike: Unlike,
 }
 
 impl<W: io::Write + Send> Sink<'_, W> {
     fn write(&mut self, estimates: &[Estimate]) -> Result<(), CliError> {
+        self.unlike.see(estimates);
         for row in estimates {
             let reading = row.resistance.unwrap_or(f64::NAN);
             if self.live && reading.is_finite() && self.early.len() < FIRST_LIVE_READINGS {

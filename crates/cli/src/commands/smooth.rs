@@ -14,7 +14,7 @@ use crate::output::RowsOut;
 use crate::readings::{StoredReadings, WAIT_IN_MEMORY, temporary};
 use crate::run::{builder, rest_resistance};
 use crate::sensor_file;
-use crate::suits;
+use crate::suits::{self, Unlike};
 
 /// Smooths a recording, writes its estimates, all or none, and returns the number of rows. For a long recording, memory holds
 /// the states of a few thousand rows, and one state for each further block of as many. Readings, and estimates, which are
@@ -39,10 +39,12 @@ pub fn run(args: &SmoothArgs, messages: &Messages) -> Result<u64, CliError> {
     let readings = StoredReadings::collect(rows, Thermometer::new(&sensor))?;
     let rest = rest_resistance(args.estimate.rest_resistance, &sensor, readings.values(), &name)?;
     suits::check_readings(&header, &sensor, rest, readings.values())?;
+    suits::warn_of_clock(&header, &sensor, (0..readings.len()).map(|row| readings.row(row).0), messages);
     let builder = builder(&sensor, &args.estimate);
     let builder = rest.map_or(builder, |measured| builder.rest_resistance(measured));
     let columns = estimates::columns(&sensor, columns)?;
-    let segments = smooth_into(Packed::new(columns.clone()), builder, &readings);
+    let mut unlike = Unlike::default();
+    let segments = smooth_into(Packed::new(columns.clone()), builder, &readings, &mut unlike);
     readings.whole()?;
     let segments = segments.map_err(|error| error.named(&name))?;
     suits::warn_of_start(args.estimate.initial_strain, &sensor, messages);
@@ -60,13 +62,23 @@ pub fn run(args: &SmoothArgs, messages: &Messages) -> Result<u64, CliError> {
     segments.write_in_order(&mut writer, see)?;
     readings.whole()?;
     let written = writer.finish()?;
+    unlike.warn(&name, messages);
     rows_out.outputs.publish()?;
     Ok(written)
 }
 
-fn smooth_into(packed: Packed, builder: FilterBuilder, readings: &StoredReadings) -> Result<Segments, CliError> {
+fn smooth_into(
+    packed: Packed,
+    builder: FilterBuilder,
+    readings: &StoredReadings,
+    unlike: &mut Unlike,
+) -> Result<Segments, CliError> {
     let mut segments = Segments::new(packed);
-    builder.smooth_backward(readings.len(), |row| readings.row(row), |_, estimates| segments.push(estimates))?;
+    let mut take = |estimates: &[Estimate]| {
+        unlike.see(estimates);
+        segments.push(estimates)
+    };
+    builder.smooth_backward(readings.len(), |row| readings.row(row), |_, estimates| take(estimates))?;
     Ok(segments)
 }
 

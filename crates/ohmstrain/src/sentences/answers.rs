@@ -11,7 +11,7 @@ use crate::{Quiet, ReferenceDoubt, StartDoubt, UnitDoubt, UnitGuess, UnusedKnown
 ///
 /// ```
 /// let quiet = ohmstrain::Quiet { from_s: 12.0, now_s: 42.1, strain: 0.031 };
-/// assert!(quiet.text(ohmstrain::Interface::CommandLine).ends_with(", --known 42.1:0 tells it"));
+/// assert!(quiet.text(ohmstrain::Interface::CommandLine).ends_with(", add --known 42.1:0"));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interface {
@@ -115,13 +115,13 @@ impl Quiet {
     ///
     /// ```
     /// let quiet = ohmstrain::Quiet { from_s: 12.0, now_s: 42.1, strain: 0.031 };
-    /// assert!(quiet.text(ohmstrain::Interface::Python).ends_with(", known=[(42.1, 0)] tells it"));
+    /// assert!(quiet.text(ohmstrain::Interface::Python).ends_with(", add known=[(42.1, 0)]"));
     /// ```
     #[must_use]
     pub fn text(&self, at: Interface) -> String {
         match at {
-            Interface::CommandLine => format!("{self}, --known {}:0 tells it", self.now_s),
-            Interface::Python => format!("{self}, known=[({}, 0)] tells it", self.now_s),
+            Interface::CommandLine => format!("{self}, add --known {}:0", self.now_s),
+            Interface::Python => format!("{self}, add known=[({}, 0)]", self.now_s),
         }
     }
 }

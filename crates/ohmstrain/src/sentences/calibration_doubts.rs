@@ -84,8 +84,8 @@ impl fmt::Display for CalibrationDoubt {
             ),
             Self::Widened { of } => write!(
                 out,
-                "the {of}'s intervals are widened by {LARGEST_SD_SCALE}, the most there is: on parts of the recordings that \
-                 it has not seen, the law is more wrong than they say; another recording, or other branches, may help"
+                "the {of}'s intervals are widened by {LARGEST_SD_SCALE}, the maximum: on held-out parts of the recordings the law errs by more than \
+                 they state; another recording, or other branches, may help"
             ),
         }
     }

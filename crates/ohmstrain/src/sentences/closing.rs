@@ -69,7 +69,7 @@ impl From<&Tested> for TestedSummary {
 
 impl From<&Tested> for Known {
     fn from(tested: &Tested) -> Self {
-        Self::new(&tested.filter, Some(&tested.static_cubic))
+        Self::new(&tested.filter, Some(&tested.static_cubic)).widened()
     }
 }
 
@@ -194,7 +194,7 @@ fn error_and_coverage(found: &Findings) -> String {
     let covered = found.filter.coverage_95.unwrap_or(0.0);
     let width = found.filter.width_95_percent_fs.unwrap_or(0.0);
     format!(
-        "{} of full scale{smoother} on quarters not fitted to, static cubic {}; the 95 % interval, {} wide, holds {} of \
+        "{} of full scale{smoother} on held-out quarters, static cubic {}; the 95 % interval, {} wide, holds {} of \
          their rows",
         error(&found.filter),
         error(&found.static_cubic),
@@ -268,7 +268,7 @@ fn limited_by(found: &Findings) -> String {
     let whole = |share: f64| fixed(100.0 * share, 0);
     let share = |(limit, share): (Limit, f64)| format!("{} {} %", limit.name(), whole(share));
     let shares = found.budget.shares().sorted().map(share).join(", ");
-    format!("{shares} of squared error; wrong way in {} %", whole(found.budget.wrong_rows))
+    format!("{shares} of squared error; direction wrong in {} % of moving rows", whole(found.budget.wrong_rows))
 }
 
 /// Lists them together with the numbers behind the shares.
@@ -286,7 +286,9 @@ fn limited_by_in_full(found: &Findings) -> String {
 fn advice(advice: &[String], elsewhere: &str) -> String {
     let first = advice.iter().take(PRINTED_ADVICE).cloned().collect::<Vec<_>>().join("; ");
     match advice.len().saturating_sub(PRINTED_ADVICE) {
-        _ if advice.is_empty() => "another recording of another day: nothing stands out in this one".into(),
+        _ if advice.is_empty() => {
+            "a recording of another day; none of this sensor's parts would clearly gain by more".into()
+        }
         0 => first,
         more => format!("{first} ({more} more: {elsewhere})"),
     }

@@ -60,7 +60,7 @@ impl fmt::Display for Quiet {
         let Self { from_s, now_s, strain } = *self;
         write!(
             out,
-            "{} s of quiet from t = {} s that may be a rest, where the strain is said to be {}: if the body was at rest there",
+            "{} s of quiet readings from t = {} s, which may be a rest; estimated strain {}: if the body was at rest",
             significant(now_s - from_s, 2),
             significant(from_s, 6),
             significant(strain, 2)
@@ -81,7 +81,7 @@ impl fmt::Display for Extrapolation {
             }
             Beyond::Readings { column, least, most, follows } => {
                 let (least, most) = (significant(least, 5), significant(most, 5));
-                let rest = if follows { "; R0 follows until today's resistance at rest is told" } else { "" };
+                let rest = if follows { "; R0 adapts, but giving it is better: --rest-resistance" } else { "" };
                 write!(out, "{column} is outside of the calibration's {least} to {most}{rest}")
             }
             Beyond::Strain { quantity, least, most } => {

@@ -32,6 +32,8 @@ pub struct Known {
     /// Share of the rows, 0 to 1, that lie in the 95 % interval.
     covered: f64,
     width: f64,
+    /// True if intervals were widened afterwards, until they held these rows.
+    is_widened: bool,
 }
 
 impl Known {
@@ -55,7 +57,13 @@ impl Known {
             static_cubic: static_cubic.map(|cubic| cubic.rmse_percent_fs),
             covered: scores.coverage_95.unwrap_or(0.0),
             width: scores.width_95_percent_fs.unwrap_or(0.0),
+            is_widened: false,
         }
+    }
+
+    /// Marks scores as those on which intervals were widened afterwards.
+    pub(crate) const fn widened(self) -> Self {
+        Self { is_widened: true, ..self }
     }
 }
 
@@ -66,6 +74,7 @@ impl From<&Summary> for Known {
             static_cubic: Some(summary.static_cubic_percent_fs),
             covered: summary.coverage_95_percent / 100.0,
             width: summary.width_95_percent_fs,
+            is_widened: false,
         }
     }
 }
@@ -112,7 +121,11 @@ pub fn of_static_curve(known: &[Known]) -> String {
 }
 
 fn of_intervals(known: &[Known]) -> &'static str {
-    match (known.iter().any(|part| part.covered < COVERED), known.iter().any(|part| part.width > WIDE)) {
+    let mut narrow = known.iter().filter(|part| part.covered < COVERED).peekable();
+    match (narrow.peek().is_some(), known.iter().any(|part| part.width > WIDE)) {
+        (true, _) if narrow.all(|part| part.is_widened) => {
+            "its error bars were too narrow on the rows of the test, and have been widened"
+        }
         (true, _) => "its error bars are too narrow",
         (false, true) => "its error bars hold, but are wide",
         (false, false) => "its error bars hold",

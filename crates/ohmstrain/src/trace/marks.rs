@@ -48,7 +48,7 @@ impl Marked {
         let known = || found.strain_sd.iter().filter(|sd| sd.is_finite());
         let variance = known().map(|sd| sd * sd).sum::<f64>() / known().count().max(1) as f64;
         format!(
-            "{}: {} marks, held at {}; {} of {} moves at a pace of their own; the reference between them is good to {} % of the marks' span",
+            "{}: {} marks, held at {}; {} of {} moves with a duration of their own; the reference between them is good to {} % of the marks' span",
             self.name,
             self.marks.len(),
             found.holds,

@@ -128,7 +128,7 @@ impl WatchedFilter {
         let beyond = self.validity.see(last.time_s, reading, last.strain_rate, f64::NAN).last();
         let quiet = self.quiet.see(last).map(|quiet| {
             let quiet_s = significant(quiet.now_s - quiet.from_s, 2);
-            format!("{quiet_s} s of quiet that may be a rest: {rested}, if it is one")
+            format!("{quiet_s} s of quiet readings, which may be a rest: {rested}, if it is one")
         });
         let unit = self.take_early(reading)?.map(|doubt| doubt.text(Interface::CommandLine));
         Ok(unit.or(quiet).or_else(|| beyond.map(|beyond| beyond.to_string())))

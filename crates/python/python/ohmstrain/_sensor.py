@@ -342,7 +342,7 @@ class Sensor:
         file = self._file or "made of parameters"
         known = params.get("summary")
         left_out = known and (
-            f"Left out     {known['left_out_percent_fs']:.2g} % of full scale on quarters not fitted to, static cubic "
+            f"Left out     {known['left_out_percent_fs']:.2g} % of full scale on held-out quarters, static cubic "
             f"{known['static_cubic_percent_fs']:.2g} %; the\n             95 % interval, "
             f"{known['width_95_percent_fs']:.3g} % wide, holds {known['coverage_95_percent']:.3g} % of their rows\n"
         )

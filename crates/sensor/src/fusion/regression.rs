@@ -192,7 +192,7 @@ mod tests {
         };
         let x: Vec<Vec<f64>> = raw.iter().map(scaled).collect();
         let noisy = DMatrix::from_fn(5, 5, |i, j| kernel(&x[i], &x[j]) + if i == j { 0.0025 } else { 0.0 });
-        let inverse = noisy.try_inverse().unwrap();
+        let inverse = noisy.clone().try_inverse().unwrap();
         let mean_strain = rows.iter().map(|row| row.strain).sum::<f64>() / 5.0;
         let targets = DVector::from_iterator(5, rows.iter().map(|row| (row.strain - mean_strain) / 0.3));
         let new = row(0.0, 0.7, 0.4);

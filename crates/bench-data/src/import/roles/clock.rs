@@ -143,6 +143,13 @@ pub(crate) fn no_readings(found: &Found) -> ImportError {
     let files = all_files(tables);
     let lists = tables.iter().map(Table::list).collect::<Vec<_>>().join(" and ");
     if tables.iter().any(Table::has_names) {
+        let channels = table.columns.iter().filter(|column| is_channel(&column.heading)).count();
+        if channels > 1 && table.columns.iter().any(|column| matches!(column.heading.as_str(), "time_s" | "time_us")) {
+            let what = format!(
+                "a trace of {channels} channels, which needs no import: go on with `ohmstrain calibrate FILE -o hand.toml`"
+            );
+            return ImportError::unreadable(&files, what);
+        }
         let answers = Role::READINGS.map(|role| format!("--column {role}=NAME"));
         return ImportError::question(&files, format!("which column holds the readings among {lists}"), answers);
     }
@@ -154,4 +161,9 @@ pub(crate) fn no_readings(found: &Found) -> ImportError {
     let what = format!("no header; which column is what among {lists}{known}");
     let answer = format!("{time}--column resistance=N --column strain=N (ratio, adc; displacement, angle, none)");
     ImportError::question(&files, what, [answer])
+}
+
+/// True if a heading is that of one of several channels in a trace: `index_ohm`.
+fn is_channel(heading: &str) -> bool {
+    ["_ohm", "_ratio", "_adc"].iter().any(|end| heading.strip_suffix(end).is_some_and(|name| !name.is_empty()))
 }

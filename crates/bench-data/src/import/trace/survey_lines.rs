@@ -27,9 +27,9 @@ impl Survey {
     fn lag_line(&self) -> Option<String> {
         let Some(lag) = self.lag else { return self.lag_unknown.as_ref().map(|why| format!("not known: {why}")) };
         let (word, seconds) = if lag.lag_s < 0.0 { ("leads", -lag.lag_s) } else { ("lags", lag.lag_s) };
-        let doubt = if lag.is_sure() { "" } else { "; without a lag they are explained about as well" };
+        let doubt = if lag.is_sure() { "" } else { "; not significant" };
         Some(format!(
-            "the reference {word} the readings by {seconds:.3} ± {:.3} s, of which ± {:.3} s may be the sensor's own{doubt}",
+            "the reference {word} the readings by {seconds:.3} ± {:.3} s, for ± {:.3} s of which the sensor's own delay may account{doubt}",
             lag.sd_s.hypot(lag.own_s),
             lag.own_s
         ))
@@ -39,7 +39,7 @@ impl Survey {
 fn clock_line(clock: &ClockSurvey) -> String {
     let ms = |seconds: f64| number(1e3 * seconds);
     let mut line = format!(
-        "{} Hz: steps of {} ms, nine in ten from {} to {} ms; {} s",
+        "{} Hz: steps of {} ms, 90 % of them {} to {} ms; {} s",
         number(1.0 / clock.step_s),
         ms(clock.step_s),
         ms(clock.step_range_s.0),

@@ -95,7 +95,9 @@ impl RecordingScores {
         };
         let seconds = self.calibration_s.map(|seconds| format!("calibrated in {seconds:.1} s"));
         let lag = self.lag_s.map(|lag| match lag {
-            Some(lag_s) => format!("the reference is {lag_s:+.2} s late"),
+            Some(lag_s) => {
+                format!("the reference is {:.2} s {}", lag_s.abs(), if lag_s < 0.0 { "early" } else { "late" })
+            }
             None => "how late the reference is cannot be told".into(),
         });
         let sample = (self.sample != Sample::Out).then(|| self.sample.name().to_owned());

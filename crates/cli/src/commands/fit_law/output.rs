@@ -198,7 +198,7 @@ fn doubts(Fitted { piece, fit }: &Fitted) -> (&str, Vec<String>) {
     let at_limit = fit.parameters.iter().filter(|found| found.at_limit);
     let at_limit: Vec<&str> = at_limit.map(|found| found.parameter.name.as_str()).collect();
     if !at_limit.is_empty() {
-        doubts.push(format!("{} at the limit of the search: the readings ask for more", at_limit.join(", ")));
+        doubts.push(format!("{} stopped at the bound of the search", at_limit.join(", ")));
     }
     (&piece.label, doubts)
 }

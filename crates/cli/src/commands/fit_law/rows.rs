@@ -39,7 +39,7 @@ impl Cell {
             Self::Text(text) | Self::Number(_, text) => text.clone(),
             Self::Estimate(value, error) => with_error(*value, *error),
             Self::AtLimit(value) => format!("{} (limit)", plain(*value)),
-            Self::NotIdentified => "not told".into(),
+            Self::NotIdentified => "undetermined".into(),
             Self::Nothing => String::new(),
         }
     }

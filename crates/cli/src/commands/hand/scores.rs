@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use crate::commands::score_table::{KEY, add_scores, score_table};
 use crate::error::CliError;
+use crate::output;
 
 /// Scores of a joint and of each of its channels alone.
 #[derive(Serialize)]
@@ -29,12 +30,13 @@ pub struct ChannelScores {
     pub smoothed: Option<Scores>,
 }
 
+/// Version of the fields of the JSON.
+const SCHEMA: u32 = 1;
+
 /// Prints scores below a heading, as JSON or as a table.
 pub fn write(out: &mut dyn Write, heading: &str, joints: &[JointScores], is_json: bool) -> Result<(), CliError> {
     if is_json {
-        serde_json::to_writer_pretty(&mut *out, &serde_json::json!({ "scored": heading, "joints": joints }))
-            .map_err(|error| CliError::Other(format!("cannot write JSON: {error}")))?;
-        return Ok(writeln!(out)?);
+        return output::json(out, SCHEMA, &serde_json::json!({ "scored": heading, "joints": joints }));
     }
     let mut table = score_table();
     for JointScores { joint, fused, smoothed, channels } in joints {

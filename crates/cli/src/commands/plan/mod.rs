@@ -115,14 +115,15 @@ fn text(sensor: &Sensor, name: &str, protocols: &Protocols, information: &[Infor
     let (low, high) = (params.law.range.lower, params.law.range.upper);
     let mut text = wrapped(&format!(
         "{name}: {} to {}, relaxation within {} s. All of this is simulated with the sensor's own law: what the law gets wrong \
-         comes on top.\n\nHow many of the law's parameters a recording tells to a quarter of them or better, and the worst of \
+         comes on top.\n\nNumber of the law's parameters that a recording determines to ± 25 % or better, and the worst of \
          their errors, at speeds of {} and levels of a quarter, a half, three quarters and all of the range:\n",
         shown(low),
         shown(high),
         significant(protocols.slowest_s, 2),
         speeds.join(", ")
     ));
-    let mut recordings = output::wrapped_table(["recording", "minutes", "told", "worst", "condition", "left open"]);
+    let mut recordings =
+        output::wrapped_table(["recording", "minutes", "determined", "worst", "condition", "least certain"]);
     for one in information {
         recordings.add_row([
             one.protocol.to_string(),
@@ -140,13 +141,13 @@ fn text(sensor: &Sensor, name: &str, protocols: &Protocols, information: &[Infor
     }
     text += &format!("{recordings}\n");
     if let Some(best) = worth::best(information) {
-        text += &wrapped(&format!("No other tells more in less time: {}.\n", best.protocol));
+        text += &wrapped(&format!("Most informative for its duration: {}.\n", best.protocol));
     }
     text += &wrapped(&format!(
         "\nError of strain by the filter {estimator}, % of the range (share of rows in the 95 % interval), by sampling and \
          converter:"
     ));
-    let converter = |bits| if bits == 0 { "as good as the sensor".into() } else { format!("{bits} bits") };
+    let converter = |bits| if bits == 0 { "no quantisation".into() } else { format!("{bits} bits") };
     let header = ["readings per s".to_owned()].into_iter().chain(worth::BITS.map(converter));
     let mut errors = output::wrapped_table(header);
     for rate in worth::RATES_HZ {
@@ -156,8 +157,13 @@ fn text(sensor: &Sensor, name: &str, protocols: &Protocols, information: &[Infor
     }
     text += &format!("{errors}\n");
     text += "Medians of five draws of noise and drift, without a learned correction.\n";
-    if let Some(enough) = worth.enough() {
-        let bits = enough.bits.map_or("a converter as good as the sensor".into(), |bits| format!("{bits} bits"));
+    if worth.is_lost() {
+        text += &wrapped(
+            "The error grows with the rate: the filter loses the strain of this sensor, and its errors say nothing of sampling. \
+             Take 10 to 50 readings per s.\n",
+        );
+    } else if let Some(enough) = worth.enough() {
+        let bits = enough.bits.map_or("a converter without quantisation".into(), |bits| format!("{bits} bits"));
         text +=
             &wrapped(&format!("{} readings per s by {bits} come within a tenth of the least error.\n", enough.rate_hz));
     }

@@ -80,6 +80,13 @@ pub struct Sampling {
 }
 
 impl Sampling {
+    /// True if the error grows with the sampling rate of an exact converter: the filter loses the strain, whatever the sampling.
+    pub fn is_lost(&self) -> bool {
+        let exact = || self.cases.iter().filter(|one| one.bits.is_none()).map(|one| one.error_percent);
+        let (first, last) = (exact().next(), exact().next_back());
+        first.zip(last).is_some_and(|(slowest, fastest)| fastest > HARDLY * slowest)
+    }
+
     /// Returns the slowest and coarsest case whose error is hardly larger than the smallest.
     pub fn enough(&self) -> Option<&Worth> {
         let least = self.cases.iter().map(|one| one.error_percent).reduce(f64::min)?;
