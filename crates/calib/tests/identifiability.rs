@@ -117,7 +117,7 @@ fn a_time_constant_beyond_the_recording_ends_on_its_bound() {
     let [on] = &found.on_bound[..] else { panic!("{found}") };
     assert_eq!((on.name.as_str(), on.bound), ("branches[0].tau_s", Bound::Upper));
     assert!(
-        found.advice.iter().any(|line| line.starts_with("hold at") && line.ends_with("holds were 12 s")),
+        found.advice.iter().any(|line| line.starts_with("hold at") && line.ends_with("the longest hold was 12 s")),
         "{found}"
     );
 }

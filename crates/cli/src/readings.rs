@@ -16,6 +16,7 @@ pub struct StoredReadings {
     /// True if a row contains, besides time and value, the deviation of a converter's reading and a byte for saturation.
     has_codes: bool,
     len: usize,
+    implausible_temperatures: usize,
     kept: RefCell<Kept>,
 }
 
@@ -56,7 +57,12 @@ impl StoredReadings {
         }
         let file = out.into_inner().map_err(|error| temporary(error.error()))?;
         let kept = Kept { file, first: 0, rows: Vec::new(), bytes: Vec::new(), failed: None };
-        Ok(Self { has_codes, len, kept: RefCell::new(kept) })
+        Ok(Self { has_codes, len, implausible_temperatures: thermometer.implausible(), kept: RefCell::new(kept) })
+    }
+
+    /// Returns the number of implausible temperatures.
+    pub const fn implausible_temperatures(&self) -> usize {
+        self.implausible_temperatures
     }
 
     /// Returns the number of rows.

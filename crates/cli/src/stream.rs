@@ -75,6 +75,11 @@ impl RowSource {
         self.thermometer.and_then(|thermometer| thermometer.last_c())
     }
 
+    /// Returns the number of implausible temperatures so far.
+    pub fn implausible_temperatures(&self) -> usize {
+        self.thermometer.map_or(0, |thermometer| thermometer.implausible())
+    }
+
     /// True if the rows have temperatures.
     pub fn has_temperature(&self) -> bool {
         match &self.rows {

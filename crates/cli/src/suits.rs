@@ -4,6 +4,7 @@ use ohmstrain::Interface::CommandLine;
 use ohmstrain::number::significant;
 use ohmstrain::trace::TraceFile;
 use ohmstrain::{Estimate, Flag, Known, ReferenceDoubt, Sensor, UnitDoubt, unused_known};
+use ohmstrain_bench_data::counted;
 
 use crate::error::CliError;
 use crate::messages::Messages;
@@ -58,6 +59,8 @@ pub fn warn_of_clock(header: &str, sensor: &Sensor, times_s: impl Iterator<Item 
 pub struct Unlike {
     rows: usize,
     extrapolated: usize,
+    /// True if a warning has already told what is beyond it.
+    pub is_told: bool,
 }
 
 impl Unlike {
@@ -69,7 +72,7 @@ impl Unlike {
 
     /// Warns if they are most of the rows.
     pub fn warn(&self, file: &str, messages: &Messages) {
-        if self.rows >= FIRST_READINGS && 2 * self.extrapolated > self.rows {
+        if !self.is_told && self.rows >= FIRST_READINGS && 2 * self.extrapolated > self.rows {
             let percent = 100 * self.extrapolated / self.rows;
             messages.warning(&format!(
                 "{file}: {percent} % of the rows are flagged `extrapolated`: sensor or use are unlike those of the calibration"
@@ -86,6 +89,16 @@ pub fn sensor_for(sensor: Sensor, has_temperature: bool, file: &str, messages: &
         "{file}: no column `temperature_c`: intervals are wider by what {lower} to {upper} °C do to the strain, as in the calibration"
     ));
     sensor.without_temperature()
+}
+
+/// Warns of temperatures that counted as not measured.
+pub fn warn_of_temperatures(implausible: usize, file: &str, messages: &Messages) {
+    if implausible > 0 {
+        messages.warning(&format!(
+            "{file}: {} far from those of the calibration counted as missing: is the probe connected?",
+            counted(implausible, "temperature")
+        ));
+    }
 }
 
 /// Warns of an initial strain that the sensor never reports.

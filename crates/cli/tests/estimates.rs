@@ -311,7 +311,7 @@ fn a_long_quiet_hold_is_asked_about() {
     };
     let (questions, unanswered) = asked(&[]);
     assert_eq!(questions.len(), 1, "{questions:?}");
-    let (_, answer) = questions[0].split_once("if the body was at rest there, ").unwrap();
+    let (_, answer) = questions[0].split_once("if the body was at rest, add ").unwrap();
     let flags: Vec<&str> = answer.split_whitespace().take(2).collect();
     let (questions, answered) = asked(&flags);
     assert!(questions.is_empty(), "{questions:?}");

@@ -145,15 +145,6 @@ fn the_file_on_standard_input_is_not_replaced() {
     assert!(bench.read("trace.csv") == before);
 }
 
-#[test]
-fn marks_are_not_replaced_by_columns_of_the_same_names() {
-    let bench = Bench::calibrated();
-    bench.write("marks.csv", "time_s,strain,strain_sd\n1,0.1,0.01\n");
-    let columns = ["--columns", "time_s,strain,strain_sd", "-o", "marks.csv"];
-    let filter = ["filter", "trace.csv", "--sensor", "sensor.toml"];
-    refused(&bench, &[&filter[..], &columns].concat(), ARGUMENTS, "cannot write marks.csv: it holds something else");
-}
-
 /// The recording is unreadable, too, and would be reported first if the output were checked later.
 #[test]
 fn an_output_that_cannot_be_written_is_noticed_before_the_work() {

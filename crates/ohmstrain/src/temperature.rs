@@ -19,7 +19,12 @@ pub struct Thermometer {
     effect: Option<TemperatureParams>,
     rest_reading: f64,
     last_c: f64,
+    /// Number of temperatures that counted as not measured.
+    implausible: usize,
 }
+
+/// Smallest distance from the calibrated temperatures at which one is implausible, K; more if these cover a wider range.
+const FAR_K: f64 = 10.0;
 
 impl Thermometer {
     /// Creates the conversion for readings of a sensor; it changes nothing if the sensor's calibration has no effect of temperature.
@@ -34,7 +39,7 @@ impl Thermometer {
     #[must_use]
     pub fn new(sensor: &Sensor) -> Self {
         let params = sensor.params();
-        Self { effect: params.temperature, rest_reading: params.rest_reading, last_c: f64::NAN }
+        Self { effect: params.temperature, rest_reading: params.rest_reading, last_c: f64::NAN, implausible: 0 }
     }
 
     /// Returns the last temperature, °C; `None` before the first.
@@ -63,8 +68,22 @@ impl Thermometer {
         Self { last_c: last_c.unwrap_or(f64::NAN), ..self }
     }
 
+    /// Returns the number of implausible temperatures: farther beyond those of the calibration than their range, and than 10 K. They come
+    /// from a probe that is disconnected, for instance.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// assert_eq!(ohmstrain::Thermometer::new(&sensor).implausible(), 0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub const fn implausible(&self) -> usize {
+        self.implausible
+    }
+
     /// Converts a reading at `temperature_c`, °C, which is NaN where it was not measured, to that of the same sensor at the reference
-    /// temperature.
+    /// temperature. An implausible temperature counts as not measured.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -83,13 +102,19 @@ impl Thermometer {
     /// let mut thermometer = Thermometer::new(&Sensor::from_params(params)?);
     /// assert!((thermometer.at_reference(1030.0, 35.0) - 1000.0).abs() < 1e-9);
     /// assert!((thermometer.at_reference(1030.0, f64::NAN) - 1000.0).abs() < 1e-9);
+    /// // A disconnected probe.
+    /// assert!((thermometer.at_reference(1030.0, -127.0) - 1000.0).abs() < 1e-9);
+    /// assert_eq!(thermometer.implausible(), 1);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
     pub fn at_reference(&mut self, reading: f64, temperature_c: f64) -> f64 {
         let Some(effect) = &self.effect else { return reading };
-        if temperature_c.is_finite() {
+        let far_k = (effect.upper_c - effect.lower_c).max(FAR_K);
+        if (effect.lower_c - far_k..=effect.upper_c + far_k).contains(&temperature_c) {
             self.last_c = temperature_c;
+        } else if temperature_c.is_finite() {
+            self.implausible += 1;
         }
         effect.at_reference(self.rest_reading, reading, self.last_c)
     }

@@ -171,7 +171,9 @@ fn parameters_are_estimated_from_the_recordings_or_marked_undetermined() {
     sensor.uncertainty = Some(Uncertainty { names, values, standard_errors, covariance: vec![vec![0.0; 2]; 2] });
     let page = page(&sensor, &[], &[], None, &[]);
     assert!(
-        page.contains("1.80 ± 0.10") && page.contains("not told (0.010 ± 0.020)") && page.contains("<td>not told</td>")
+        page.contains("1.80 ± 0.10")
+            && page.contains("undetermined (0.010 ± 0.020)")
+            && page.contains("<td>undetermined</td>")
     );
     assert!(page.contains("Told by the recordings"));
 }

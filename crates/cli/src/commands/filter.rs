@@ -198,6 +198,7 @@ impl<'a, W: io::Write + Send> Stream<'a, W> {
             }
         };
         self.skipped.say(self.sink.messages);
+        suits::warn_of_temperatures(rows.implausible_temperatures(), &self.sink.file, self.sink.messages);
         if let (Ok(()), Some(times)) = (&streamed, self.times) {
             suits::warn_of_unused(&self.args.estimate.known, times, &self.sink.file, self.sink.messages);
             self.sink.unlike.warn(&self.sink.file, self.sink.messages);
@@ -315,6 +316,7 @@ impl<W: io::Write + Send> Sink<'_, W> {
             }
             for warning in self.watch.see(row.time_s, reading, row.strain_rate, f64::NAN) {
                 self.messages.warning(&format!("{}: {warning}", self.file));
+                self.unlike.is_told = true;
             }
             if let Some(quiet) = self.quiet.see(row) {
                 self.messages.warning(&format!("{}: {}", self.file, quiet.text(CommandLine)));

@@ -39,6 +39,7 @@ pub fn run(args: &SmoothArgs, messages: &Messages) -> Result<u64, CliError> {
     let readings = StoredReadings::collect(rows, Thermometer::new(&sensor))?;
     let rest = rest_resistance(args.estimate.rest_resistance, &sensor, readings.values(), &name)?;
     suits::check_readings(&header, &sensor, rest, readings.values())?;
+    suits::warn_of_temperatures(readings.implausible_temperatures(), &name, messages);
     suits::warn_of_clock(&header, &sensor, (0..readings.len()).map(|row| readings.row(row).0), messages);
     let builder = builder(&sensor, &args.estimate);
     let builder = rest.map_or(builder, |measured| builder.rest_resistance(measured));
@@ -56,6 +57,7 @@ pub fn run(args: &SmoothArgs, messages: &Messages) -> Result<u64, CliError> {
         let (time_s, reading) = readings.row(row);
         for warning in watch.see(time_s, reading.value, rate.into(), f64::NAN) {
             messages.warning(&format!("{name}: {warning}"));
+            unlike.is_told = true;
         }
     };
     let mut writer = EstimateWriter::new(rows_out.open(false)?, args.written.format(), columns)?;

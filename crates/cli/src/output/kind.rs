@@ -118,9 +118,7 @@ const FUSION: [&str; 2] = ["novelty = ", "sd_scale = "];
 
 /// True if recordings may have a column of this name, too.
 fn is_recorded(name: &str) -> bool {
-    const COLUMNS: [&str; 7] =
-        ["time_s", "resistance_ohm", "resistance_ratio", "strain", "angle_deg", "strain_sd", "angle_sd"];
-    COLUMNS.contains(&name)
+    ["time_s", "resistance_ohm", "resistance_ratio", "strain", "angle_deg"].contains(&name)
 }
 
 /// True if a header is that of `hand`: for each joint an angle or a strain, and its deviation.

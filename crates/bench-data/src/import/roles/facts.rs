@@ -233,9 +233,10 @@ fn says(table: &Table, place: usize) -> Option<(Role, Sureness)> {
             || matches!(cell, Cell::Text(text) if is_stamp(&text) || ohms(&text, decimal).is_some())
     };
     let found = suggested.filter(|_| column.cells.cells().any(is_value));
-    // A constant resistance is a setting, such as the range of a meter or the other arm of a divider.
+    // A constant resistance is a setting, such as the range of a meter or the other arm of a divider, unless its name says otherwise.
     let ohms = || column.cells.iter().filter(|cell| !cell.is_empty());
     let is_setting =
         || column.cells.len() >= FEWEST_ROWS && ohms().next().is_some_and(|first| ohms().all(|cell| cell == first));
-    found.filter(|(role, _)| *role != Role::Resistance || !is_setting())
+    let is_named = || names::role(&column.name, None).is_some_and(|(role, _)| role == Role::Resistance);
+    found.filter(|(role, _)| *role != Role::Resistance || is_named() || !is_setting())
 }
