@@ -100,7 +100,7 @@ fn lost_and_missing_lines_are_reported() {
         (line(57) + &line(58), "expected step 0 first, found step 57: reset the board while it is listened to"),
         (
             "strain:0.01,lo:0.0,hi:0.02\n".into(),
-            "expected lines like step:0,us:50000,ohm:1600.0000,strain:0.10000,lo:0.08000,hi:0.12000,flags:0, \
+            "expected lines like step:0,us:50000,ohm:1600.0000,reading_sd:4.000000,strain:0.10000,lo:0.08000,hi:0.12000,flags:0, \
              found none in 1; is OHMSTRAIN_CHECK 1 in the sketch?",
         ),
     ] {

@@ -53,7 +53,7 @@ pub fn run(args: &SerialCheckArgs) -> Result<(), CliError> {
 }
 
 /// Line that the sketch prints.
-const LINE: &str = "step:0,us:50000,ohm:1600.0000,strain:0.10000,lo:0.08000,hi:0.12000,flags:0";
+const LINE: &str = "step:0,us:50000,ohm:1600.0000,reading_sd:4.000000,strain:0.10000,lo:0.08000,hi:0.12000,flags:0";
 
 /// A step as the board printed it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,6 +62,8 @@ struct BoardStep {
     /// Time since the step before, µs.
     since_us: u32,
     ohm: f64,
+    /// Standard deviation of the reading; 0 from a sketch without one.
+    ohm_sd: f64,
     strain: f64,
     sd: f64,
     flags: u32,
@@ -82,7 +84,8 @@ impl BoardStep {
         };
         let sd = (number("hi")? - number("lo")?) / (2.0 * HALF_WIDTH);
         let (since_us, flags) = (text("us")?.parse().ok()?, text("flags")?.parse().ok()?);
-        Some(Self { number: text("step")?.parse().ok()?, since_us, ohm, strain: number("strain")?, sd, flags })
+        let ohm_sd = if text("reading_sd").is_some() { number("reading_sd")? } else { 0.0 };
+        Some(Self { number: text("step")?.parse().ok()?, since_us, ohm, ohm_sd, strain: number("strain")?, sd, flags })
     }
 }
 
@@ -146,8 +149,11 @@ fn replayed(
     steps: &[BoardStep],
 ) -> Result<Vec<ChipEstimate>, export::ExportError> {
     // Rounded as the sketch rounds it.
-    let row =
-        |step: &BoardStep| ReplayedRow { since_s: 1e-6_f32 * step.since_us as f32, reading: step.ohm, reading_sd: 0.0 };
+    let row = |step: &BoardStep| ReplayedRow {
+        since_s: 1e-6_f32 * step.since_us as f32,
+        reading: step.ohm,
+        reading_sd: step.ohm_sd,
+    };
     let rows: Vec<ReplayedRow> = steps.iter().map(row).collect();
     export::replay(params, plan, dt_s, &rows)
 }

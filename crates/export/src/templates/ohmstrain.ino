@@ -46,6 +46,12 @@ float sensor_ohm() {
   return ohm_of(level(), 1);
 }
 
+// Standard deviation of the resistance by the steps of the converter, ohm; 0 if the sensor is not connected. Without it, equal codes
+// of a sensor at rest count as a stuck reading.
+float sd_of(float ohm) {
+  return ohm < 1e9f ? 0.29f * (ohm + R_SERIES) * (ohm + R_SERIES) / (R_SERIES * SUPPLY) : 0.0f;
+}
+
 // Resistance of the rested sensor, ohm, from the mean of 64 levels.
 float rested_ohm() {
   uint32_t sum = 0;
@@ -56,9 +62,9 @@ float rested_ohm() {
 }
 
 {% if reading_unit == "ohm" %}
-// Reading for the filter, which was calibrated in ohm.
-float reading_now() {
-  return sensor_ohm();
+// Reading for the filter, which was calibrated in ohm, per ohm.
+float per_ohm() {
+  return 1.0f;
 }
 
 // Restarts the filter while the sensor rests, relaxed. Returns an error, and changes nothing, if it is not connected.
@@ -68,9 +74,9 @@ ohmstrain_status rests_now() {
 {% else %}
 float rest_ohm = 1.0f;  // last measured resistance of the relaxed sensor
 
-// Reading for the filter, which was calibrated with ratios.
-float reading_now() {
-  return OHMSTRAIN_RESTED * (sensor_ohm() / rest_ohm);
+// Reading for the filter, which was calibrated with ratios, per ohm.
+float per_ohm() {
+  return OHMSTRAIN_RESTED / rest_ohm;
 }
 
 // Restarts the filter while the sensor rests, relaxed. Returns an error, and changes nothing, if it is not connected.
@@ -133,13 +139,13 @@ void loop() {
   if (Serial.available() > 0 && Serial.read() == 'z') {
     rests_now();
   }
-  const float reading = reading_now();
+  const float ohm = sensor_ohm(), reading = per_ohm() * ohm, reading_sd = per_ohm() * sd_of(ohm);
   uint32_t since_us = now_us - last_us;
   // A step that is a little late counts as a usual one, whose constants are tabulated; others take an Uno half as long again.
   const bool is_usual = since_us - PERIOD_US < PERIOD_US / 64;
   since_us = is_usual ? PERIOD_US : since_us;
   const float since_s = is_usual ? OHMSTRAIN_DT_S : 1e-6f * static_cast<float>(since_us);
-  const ohmstrain_status status = ohmstrain_step_after(&state, since_s, reading, 0.0f, nullptr);
+  const ohmstrain_status status = ohmstrain_step_after(&state, since_s, reading, reading_sd, nullptr);
   if (status != OHMSTRAIN_OK) {
     // The state is unchanged, so the next step includes this one's time.
     tell("ohmstrain_step_after: ", status);
@@ -157,6 +163,8 @@ void loop() {
   Serial.print(static_cast<unsigned long>(since_us));
   Serial.print(",ohm:");
   Serial.print(reading, 4);
+  Serial.print(",reading_sd:");
+  Serial.print(reading_sd, 6);
   Serial.print(",");
 #endif
   show("strain:", estimate.strain);

@@ -44,11 +44,20 @@ static bool measure(uint32_t count, float *ohm)
     return true;
 }
 
-{% if reading_unit == "ohm" %}
-/* Measures a reading for the filter, which was calibrated in ohm. */
-static bool take_reading(float *reading)
+/* Returns the standard deviation of a resistance by the steps of the converter, ohm; 0 if the sensor is not connected. Without it,
+ * equal codes of a sensor at rest count as a stuck reading. */
+static float sd_of(float ohm)
 {
-    return measure(1, reading);
+    return ohm < 1e9f ? 0.29f * (ohm + R_SERIES) * (ohm + R_SERIES) / (R_SERIES * FULL_SCALE) : 0.0f;
+}
+
+{% if reading_unit == "ohm" %}
+/* Measures a reading for the filter, which was calibrated in ohm, and its standard deviation. */
+static bool take_reading(float *reading, float *reading_sd)
+{
+    const bool converted = measure(1, reading);
+    *reading_sd = sd_of(*reading);
+    return converted;
 }
 
 ohmstrain_status ohmstrain_app_rest(void)
@@ -59,12 +68,13 @@ ohmstrain_status ohmstrain_app_rest(void)
 {% else %}
 static float rest_ohm = 1.0f; /* resistance of the relaxed sensor */
 
-/* Measures a reading for the filter, a ratio. */
-static bool take_reading(float *reading)
+/* Measures a reading for the filter, a ratio, and its standard deviation. */
+static bool take_reading(float *reading, float *reading_sd)
 {
     float ohm = 0.0f;
     const bool converted = measure(1, &ohm);
     *reading = OHMSTRAIN_RESTED * (ohm / rest_ohm);
+    *reading_sd = OHMSTRAIN_RESTED * (sd_of(ohm) / rest_ohm);
     return converted;
 }
 
@@ -119,7 +129,7 @@ void ohmstrain_app_poll(void)
     const uint32_t now = ticks;
     ohmstrain_estimate estimate;
     ohmstrain_status status;
-    float reading = 0.0f, since_s;
+    float reading = 0.0f, reading_sd = 0.0f, since_s;
     if (now == seen) {
         return;
     }
@@ -127,8 +137,8 @@ void ohmstrain_app_poll(void)
     seen = now;
     since_s = OHMSTRAIN_DT_S * (float)periods;
     /* A failed conversion is a missing reading. */
-    status = take_reading(&reading) ? ohmstrain_step_after(&state, since_s, reading, 0.0f, 0)
-                                    : ohmstrain_predict_for(&state, since_s);
+    status = take_reading(&reading, &reading_sd) ? ohmstrain_step_after(&state, since_s, reading, reading_sd, 0)
+                                                 : ohmstrain_predict_for(&state, since_s);
     if (status != OHMSTRAIN_OK) {
         /* The state is unchanged, so the next step includes this one's time. */
         send(line, snprintf(line, sizeof line, "# the step was refused: %d\r\n", (int)status));

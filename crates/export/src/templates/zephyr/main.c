@@ -45,6 +45,14 @@ static int measure(uint32_t count, float *ohm)
     return 0;
 }
 
+/* Returns the standard deviation of a resistance by the steps of the converter, ohm; 0 if the sensor is not connected. Without it,
+ * equal codes of a sensor at rest count as a stuck reading. */
+static float sd_of(float ohm)
+{
+    const float codes = (float)BIT_MASK(channel.resolution);
+    return ohm < 1e9f ? 0.29f * (ohm + R_SERIES) * (ohm + R_SERIES) / (R_SERIES * codes) : 0.0f;
+}
+
 {% if reading_unit == "ohm" %}
 /* Starts the filter. The resistance at rest drifts from day to day: pass that of measure(64, ...) to ohmstrain_rezero while the
  * sensor is relaxed. */
@@ -53,10 +61,12 @@ static ohmstrain_status start(void)
     return ohmstrain_start(&state);
 }
 
-/* Measures a reading for the filter, which was calibrated in ohm. */
-static int take_reading(float *reading)
+/* Measures a reading for the filter, which was calibrated in ohm, and its standard deviation. */
+static int take_reading(float *reading, float *reading_sd)
 {
-    return measure(1, reading);
+    const int error = measure(1, reading);
+    *reading_sd = sd_of(*reading);
+    return error;
 }
 {% else %}
 static float rest_ohm = 1.0f; /* resistance of the relaxed sensor */
@@ -74,10 +84,11 @@ static ohmstrain_status start(void)
     return ohmstrain_rezero(&state, OHMSTRAIN_RESTED);
 }
 
-/* Measures a reading for the filter, a ratio. */
-static int take_reading(float *reading)
+/* Measures a reading for the filter, a ratio, and its standard deviation. */
+static int take_reading(float *reading, float *reading_sd)
 {
     const int error = measure(1, reading);
+    *reading_sd = OHMSTRAIN_RESTED * (sd_of(*reading) / rest_ohm);
     *reading = OHMSTRAIN_RESTED * (*reading / rest_ohm);
     return error;
 }
@@ -116,13 +127,13 @@ int main(void)
     k_timer_start(&pace, K_USEC(<< dt_us >>), K_USEC(<< dt_us >>));
     for (;;) {
         ohmstrain_estimate estimate;
-        float reading = 0.0f, since_s;
+        float reading = 0.0f, reading_sd = 0.0f, since_s;
         /* Waits for the next period; more than one has passed if a step came late. */
         periods += k_timer_status_sync(&pace);
         since_s = OHMSTRAIN_DT_S * (float)periods;
-        error = take_reading(&reading);
+        error = take_reading(&reading, &reading_sd);
         /* A failed conversion is a missing reading. */
-        status = error == 0 ? ohmstrain_step_after(&state, since_s, reading, 0.0f, NULL)
+        status = error == 0 ? ohmstrain_step_after(&state, since_s, reading, reading_sd, NULL)
                             : ohmstrain_predict_for(&state, since_s);
         if (status != OHMSTRAIN_OK) {
             /* The state is unchanged, so the next step includes this one's time. */
