@@ -28,6 +28,8 @@ const DRAWS: u64 = 5;
 const DETERMINED_BELOW: f64 = 0.25;
 /// Factor up to which an error is hardly larger than another.
 const HARDLY: f64 = 1.1;
+/// Factor by which the error grows from the slowest to the fastest rate if the filter loses the strain.
+const LOST: f64 = 1.5;
 /// Smallest reading, as a share of R₀: the drift also represents errors of the law, and can exceed the resistance.
 const LEAST_READING: f64 = 0.01;
 /// Relative step of the central difference: its truncation error (the square) and its rounding error are both below 1e-9.
@@ -84,7 +86,7 @@ impl Sampling {
     pub fn is_lost(&self) -> bool {
         let exact = || self.cases.iter().filter(|one| one.bits.is_none()).map(|one| one.error_percent);
         let (first, last) = (exact().next(), exact().next_back());
-        first.zip(last).is_some_and(|(slowest, fastest)| fastest > HARDLY * slowest)
+        first.zip(last).is_some_and(|(slowest, fastest)| fastest > LOST * slowest)
     }
 
     /// Returns the slowest and coarsest case whose error is hardly larger than the smallest.
