@@ -287,7 +287,7 @@ fn advice(advice: &[String], elsewhere: &str) -> String {
     let first = advice.iter().take(PRINTED_ADVICE).cloned().collect::<Vec<_>>().join("; ");
     match advice.len().saturating_sub(PRINTED_ADVICE) {
         _ if advice.is_empty() => {
-            "a recording of another day; none of this sensor's parts would clearly gain by more".into()
+            "a recording of another day; nothing else would clearly help".into()
         }
         0 => first,
         more => format!("{first} ({more} more: {elsewhere})"),
