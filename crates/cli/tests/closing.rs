@@ -48,7 +48,7 @@ fn a_calibration_ends_in_ten_lines() {
         // Shares of the error, the largest first.
         let limited = printed.lines().find(|line| line.starts_with("Limited by")).unwrap();
         let shares: Vec<f64> = limited
-            .split(" of squared error")
+            .split(" of MSE")
             .next()
             .unwrap()
             .split(", ")

@@ -268,7 +268,7 @@ fn limited_by(found: &Findings) -> String {
     let whole = |share: f64| fixed(100.0 * share, 0);
     let share = |(limit, share): (Limit, f64)| format!("{} {} %", limit.name(), whole(share));
     let shares = found.budget.shares().sorted().map(share).join(", ");
-    format!("{shares} of squared error; wrong direction in {} %", whole(found.budget.wrong_rows))
+    format!("{shares} of MSE; wrong direction in {} %", whole(found.budget.wrong_rows))
 }
 
 /// Lists them together with the numbers behind the shares.
