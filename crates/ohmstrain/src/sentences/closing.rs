@@ -286,9 +286,7 @@ fn limited_by_in_full(found: &Findings) -> String {
 fn advice(advice: &[String], elsewhere: &str) -> String {
     let first = advice.iter().take(PRINTED_ADVICE).cloned().collect::<Vec<_>>().join("; ");
     match advice.len().saturating_sub(PRINTED_ADVICE) {
-        _ if advice.is_empty() => {
-            "a recording of another day; nothing else would clearly help".into()
-        }
+        _ if advice.is_empty() => "a recording of another day; nothing else would clearly help".into(),
         0 => first,
         more => format!("{first} ({more} more: {elsewhere})"),
     }

@@ -10,7 +10,7 @@ use crate::metadata::Metadata;
 
 /// Largest number of header lines above the data: two of names, one of units.
 const MOST_HEADER_LINES: usize = 3;
-/// How a logger reduced its samples to a row: a line of these below the units is skipped.
+/// Processes by which a logger reduces its samples to a row; a line of them below the units is skipped.
 const PROCESSES: [&str; 8] = ["smp", "avg", "max", "min", "std", "tot", "med", "win"];
 
 /// Lines above the data.
