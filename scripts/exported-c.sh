@@ -375,14 +375,15 @@ examples() {
     local link=(--specs=nano.specs -nostartfiles "-T$here/mps2.ld" -Wl,--gc-sections)
     # Ten kiloohms in series; products with codes of 12 bits are exact in single precision, and so readings have the same bits here and there.
     awk -F, -v codes="$work/replayed_codes.h" -v readings="$work/readings.csv" 'BEGIN {
-        print "time_s,resistance_ohm" >readings
+        print "time_s,resistance_ohm,reading_sd" >readings
         print "static const short CODES[] = {" >codes
     } /^[0-9]/ {
         code = $2 == "" ? -1 : int(4095 * $2 / ($2 + 10000) + 0.5)
         if (++row % 61 == 0) code = -2
         print code "," >codes
-        if (code == -1) printf "%.9g,\n", $1 >readings
-        if (code >= 0) printf "%.9g,%.17g\n", $1, 10000 * code / (4095 - code) >readings
+        ohm = 10000 * code / (4095 - code)
+        if (code == -1) printf "%.9g,,\n", $1 >readings
+        if (code >= 0) printf "%.9g,%.17g,%.9g\n", $1, ohm, 0.29 * (ohm + 10000) * (ohm + 10000) / (10000 * 4095) >readings
     } END { print "};" >codes }' "$work/faulty.csv"
     gcc -O2 "${strict[@]}" -I"$folder/src" "$folder/src/ohmstrain.c" "$folder/selftest/replay.c" -lm -o "$work/replay"
     "$work/replay" <"$work/readings.csv" >"$work/host.csv"
