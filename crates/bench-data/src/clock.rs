@@ -3,9 +3,9 @@ use crate::error::{Fault, quote};
 
 /// The range of a 32-bit microsecond counter.
 const WRAP_US: u64 = 1 << 32;
-/// A counter that decreases has wrapped if that is a step forward by less than this share of its range. A device that was restarted
-/// begins at 0, too, but seldom so shortly before its counter would have wrapped.
-pub(crate) const LONGEST_WRAP: u64 = 8;
+/// Inverse of the share of a counter's range by which it may step forward in a wrap. A device that was restarted begins at 0, too, but
+/// seldom so shortly before its counter would have wrapped.
+pub(crate) const WRAP_WITHIN: u64 = 8;
 
 /// The time column, checked to increase strictly.
 pub(crate) enum Clock {
@@ -97,7 +97,7 @@ fn microseconds(cell: &str, last: Option<Microseconds>) -> Result<Microseconds, 
         None if last.counter < WRAP_US => counter + WRAP_US - last.counter,
         None => 0,
     };
-    if step == 0 || (counter < last.counter && step >= WRAP_US / LONGEST_WRAP) {
+    if step == 0 || (counter < last.counter && step >= WRAP_US / WRAP_WITHIN) {
         return Err(backwards());
     }
     let unwrapped = last.unwrapped.checked_add(step).ok_or_else(backwards)?;

@@ -34,15 +34,15 @@ fn a_row_with_more_cells_than_columns_is_refused() {
 
 #[test]
 fn an_overload_is_a_missing_value_in_any_unit() {
-    let row =
-        |ms, ohm, strain| if ms == 300 { "0.300,9.9E37,9.9E37".into() } else { seconds_ohms_percent(ms, ohm, strain) };
+    let row = |ms: i64, ohm, strain| {
+        let cells = seconds_ohms_percent(ms, ohm, strain);
+        if ms == 301 { "0.301,9.9E37,9.9E37".to_owned() } else { cells }
+    };
     let text = file("time_s,R (mOhm),strain_percent\n", row);
     let (_, imported) = proposed(&[("a.csv", text.into_bytes())], &Recipe::default()).unwrap();
     let trace = &imported.trace;
-    let at = trace.time_s.iter().position(|time| *time == 0.3);
-    if let Some(row) = at {
-        assert!(trace.readings.values[row].is_nan() && trace.reference.as_ref().unwrap().values[row].is_nan());
-    }
+    let row = trace.time_s.iter().position(|time| *time == 0.301).unwrap();
+    assert!(trace.readings.values[row].is_nan() && trace.reference.as_ref().unwrap().values[row].is_nan());
 }
 
 #[test]
@@ -199,4 +199,28 @@ fn json_loses_no_recording_and_no_column() {
     let text = "{\"time_s\":[0,1,2,3,4,5,6,7,8,9],\"resistance_ohm\":[1,2,3,4,NaN,6,7,8,9],\"note\":[1]}";
     let (_, imported) = proposed(&[("b.json", text.as_bytes().to_vec())], &Recipe::default()).unwrap();
     assert!(imported.trace.readings.values[4].is_nan() && imported.trace.readings.values[9].is_nan());
+}
+
+/// Header of a LabVIEW file of two channels, in kΩ and percent, with these columns of times and steps.
+fn labview(x_columns: &str, steps: [&str; 2], names: &str) -> String {
+    format!(
+        "LabVIEW Measurement\nSeparator\tTab\nDecimal_Separator\t.\nX_Columns\t{x_columns}\n***End_of_Header***\n\
+         Channels\t2\nY_Unit_Label\tkOhm\t%\nX0\t0.25\t0.25\nDelta_X\t{}\t{}\n***End_of_Header***\n{names}\n",
+        steps[0], steps[1]
+    )
+}
+
+#[test]
+fn labview_files_have_the_units_of_their_header_and_one_step() {
+    let names = "X_Value\tResistance\tStrain";
+    let row = |ms, ohm, strain| seconds_kohms_percent(ms, ohm, strain).replace(',', "\t");
+    // With times in the file the steps do not matter.
+    is_imported("one.lvm", file(&labview("One", ["0.05", "0.1"], names), row), &Recipe::default());
+    let without = |ms, ohm, strain| row(ms, ohm, strain).split_once('\t').map(|(_, rest)| format!("\t{rest}")).unwrap();
+    let text = file(&labview("No", ["0.05", "0.1"], names), without);
+    asks(&[("no.lvm", &text)], &Recipe::default(), &["no.lvm:9", "one step between rows, 0.05", "`0.1`"]);
+    // Another segment, in other units.
+    let text = file(&labview("No", ["0.05", "0.05"], names), without);
+    let segment = text.split_once("Channels").unwrap().1.replace("kOhm", "Ohm");
+    asks(&[("two.lvm", &format!("{text}Channels{segment}"))], &Recipe::default(), &["as above", "Resistance (Ohm)"]);
 }

@@ -60,7 +60,7 @@ pub struct Unlike {
     rows: usize,
     extrapolated: usize,
     /// True if a warning has already told what is beyond it.
-    pub is_told: bool,
+    pub is_warned: bool,
 }
 
 impl Unlike {
@@ -72,7 +72,7 @@ impl Unlike {
 
     /// Warns if they are most of the rows.
     pub fn warn(&self, file: &str, messages: &Messages) {
-        if !self.is_told && self.rows >= FIRST_READINGS && 2 * self.extrapolated > self.rows {
+        if !self.is_warned && self.rows >= FIRST_READINGS && 2 * self.extrapolated > self.rows {
             let percent = 100 * self.extrapolated / self.rows;
             messages.warning(&format!(
                 "{file}: {percent} % of the rows are flagged `extrapolated`: sensor or use are unlike those of the calibration"

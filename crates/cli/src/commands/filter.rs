@@ -316,7 +316,7 @@ impl<W: io::Write + Send> Sink<'_, W> {
             }
             for warning in self.watch.see(row.time_s, reading, row.strain_rate, f64::NAN) {
                 self.messages.warning(&format!("{}: {warning}", self.file));
-                self.unlike.is_told = true;
+                self.unlike.is_warned = true;
             }
             if let Some(quiet) = self.quiet.see(row) {
                 self.messages.warning(&format!("{}: {}", self.file, quiet.text(CommandLine)));

@@ -57,7 +57,7 @@ pub fn run(args: &SmoothArgs, messages: &Messages) -> Result<u64, CliError> {
         let (time_s, reading) = readings.row(row);
         for warning in watch.see(time_s, reading.value, rate.into(), f64::NAN) {
             messages.warning(&format!("{name}: {warning}"));
-            unlike.is_told = true;
+            unlike.is_warned = true;
         }
     };
     let mut writer = EstimateWriter::new(rows_out.open(false)?, args.written.format(), columns)?;

@@ -81,7 +81,7 @@ impl fmt::Display for Extrapolation {
             }
             Beyond::Readings { column, least, most, follows } => {
                 let (least, most) = (significant(least, 5), significant(most, 5));
-                let rest = if follows { "; R0 adapts, but giving it is better: --rest-resistance" } else { "" };
+                let rest = if follows { "; R0 adapts, but today's resistance at rest is better given" } else { "" };
                 write!(out, "{column} is outside of the calibration's {least} to {most}{rest}")
             }
             Beyond::Strain { quantity, least, most } => {

@@ -140,6 +140,7 @@ impl FusionParams {
             if channels == all {
                 return Some(some);
             }
+            // If the fit to all channels states too much, the smaller excess of a part is measured from there.
             let of_all = Regression::new(&rows, params, &all, span).map_or(0.0, |all| all.excess());
             let unstated = some.excess() - of_all.min(0.0);
             Some(some.with_unstated(unstated))

@@ -1,4 +1,4 @@
-use crate::clock::LONGEST_WRAP;
+use crate::clock::WRAP_WITHIN;
 use crate::error::{Fault, quote};
 use crate::import::error::ImportError;
 use crate::import::roles::{Channel, Clock};
@@ -57,7 +57,7 @@ fn counts(tables: &[Table], channel: &Channel, own_missing: &[String]) -> Result
         if bare.is_nan() {
             continue;
         }
-        if bare < last && last < wrap_s && bare + wrap_s - last < wrap_s / LONGEST_WRAP as f64 {
+        if bare < last && last < wrap_s && bare + wrap_s - last < wrap_s / WRAP_WITHIN as f64 {
             wraps += 1;
         }
         last = bare;

@@ -1,6 +1,6 @@
 //! LabVIEW measurement files. Without a column of times, these follow from `X0` and `Delta_X` in the header of each segment.
 
-use crate::error::Fault;
+use crate::error::{Fault, quote};
 use crate::import::bytes::{Cell, Rows};
 use crate::import::words::{DecimalMark, number, units};
 
@@ -26,25 +26,7 @@ enum Times {
 ///
 /// # Errors
 /// The line and the fault, if channels of a segment have different steps.
-pub(crate) fn rows<'a>(lines: &[(u64, &'a str)]) -> Result<Option<(Rows<'a>, DecimalMark)>, (u64, Fault)> {
-    let conflict = lines.iter().find_map(|(number, line)| {
-        let mut steps =
-            line.split(if line.contains('\t') { '\t' } else { ',' }).map(str::trim).filter(|cell| !cell.is_empty());
-        let first = (steps.next() == Some("Delta_X")).then(|| steps.next())??;
-        Some((*number, steps.find(|step| *step != first)?, first))
-    });
-    // With columns of times, the steps do not matter.
-    let is_computed =
-        lines.iter().any(|(_, line)| line.strip_prefix("X_Columns").is_some_and(|rest| rest.trim() == "No"));
-    match (found(lines), conflict.filter(|_| is_computed)) {
-        (Some(_), Some((number, step, first))) => {
-            Err((number, Fault::new(format!("one step between rows, {first}, for all channels"), step)))
-        }
-        (found, _) => Ok(found),
-    }
-}
-
-fn found<'a>(lines: &[(u64, &'a str)]) -> Option<(Rows<'a>, DecimalMark)> {
+pub(crate) fn rows<'a>(lines: &[(u64, &'a str)]) -> Option<Result<(Rows<'a>, DecimalMark), (u64, Fault)>> {
     let first = lines.first()?.1.trim_start_matches('\u{feff}').trim_start();
     let end = lines.iter().position(|(_, line)| line.starts_with(END)).filter(|_| first.starts_with(MAGIC))?;
     let separator = if value(&lines[..end], "Separator") == Some("Comma") { ',' } else { '\t' };
@@ -67,6 +49,15 @@ fn found<'a>(lines: &[(u64, &'a str)]) -> Option<(Rows<'a>, DecimalMark)> {
         if cells[0] == END {
             (in_header, has_names) = (false, false);
         } else if in_header {
+            // With columns of times, the steps do not matter.
+            if let (Times::Computed, ["Delta_X", first, others @ ..]) = (times, &cells[..])
+                && let Some(other) = others.iter().find(|other| !other.is_empty() && *other != first)
+            {
+                return Some(Err((
+                    line,
+                    Fault::new(format!("one step between rows, {first}, for all channels"), quote(other)),
+                )));
+            }
             segment.take(&cells);
         } else if !has_names {
             has_names = true;
@@ -81,7 +72,7 @@ fn found<'a>(lines: &[(u64, &'a str)]) -> Option<(Rows<'a>, DecimalMark)> {
             out.push((line, cells.iter().map(|cell| Cell::text(cell)).collect()));
         }
     }
-    Some((out, decimal))
+    Some(Ok((out, decimal)))
 }
 
 /// Header of a segment.

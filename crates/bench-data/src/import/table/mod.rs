@@ -2,6 +2,7 @@
 
 mod columns;
 mod data;
+mod date_column;
 mod description;
 mod fractions;
 mod grid;

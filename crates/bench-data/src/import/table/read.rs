@@ -5,6 +5,7 @@ use crate::import::bytes::{Cell, Cells, Contents, NamedSheets, RawColumn, open};
 use crate::import::error::{ImportError, quoted};
 use crate::import::table::columns::{Column, Layout, Table};
 use crate::import::table::data::Shape;
+use crate::import::table::date_column;
 use crate::import::table::fractions;
 use crate::import::table::grid::{Grid, SAMPLE, is_monitor};
 use crate::import::table::header::Header;
@@ -31,7 +32,7 @@ pub fn read_table(bytes: Vec<u8>, name: &str, options: &ReadOptions) -> Result<T
         Contents::Columns(columns, format) => of_columns(columns, name, format),
     };
     fractions::join(&mut table);
-    fractions::join_dates(&mut table);
+    date_column::join(&mut table);
     unit_column::take(&mut table);
     options.rows.iter().try_for_each(|filter| table.keep(filter))?;
     table.layout.format.insert_str(0, &wrappings);
@@ -48,7 +49,8 @@ fn of_text(text: &str, encoding: &'static str, name: &str, options: &ReadOptions
     let below = &lines[lines.partition_point(|(number, _)| *number <= skip as u64)..];
     let monitor = is_monitor(below.iter().take(SAMPLE).map(|(_, line)| *line));
     let layout = Layout { format: "text".to_owned(), encoding: Some(encoding), ..Layout::default() };
-    let labview = labview::rows(&lines).map_err(|(line, fault)| ImportError::content(name, line, fault))?;
+    let labview = labview::rows(&lines).transpose();
+    let labview = labview.map_err(|(line, fault)| ImportError::content(name, line, fault))?;
     if let Some((rows, decimal)) = labview {
         let layout = Layout { format: "LabVIEW measurement".to_owned(), decimal, ..layout };
         return of_lines(name, &Grid::Rows(rows), layout, skip);
