@@ -90,6 +90,24 @@ fn all_ways_agree_at_the_end() {
     }
 }
 
+/// A smoother's correction has learned from rows with later readings. At the last reading there are none, and its strain is the
+/// filter's.
+#[test]
+fn a_corrected_smoother_ends_where_the_filter_does() {
+    let sensor = Sensor::from_toml(include_str!("../../../tests/fixtures/representative.toml")).unwrap();
+    assert_eq!(sensor.params().default_estimator, EstimatorKind::Corrected);
+    let time_s: Vec<f64> = (0..400).map(|k| 0.05 * f64::from(k)).collect();
+    let rest = 3199.661;
+    let ohm: Vec<f64> = time_s.iter().map(|time_s| rest * (1.6 - 0.6 * (0.4 * time_s).cos())).collect();
+    // Without what a smoother does in another way, or not at all.
+    let bare = || sensor.filter().rest_resistance(rest).without_second_look().without_doubts();
+    let smoothed = bare().smooth(&time_s, &ohm).unwrap();
+    let mut filter = bare().build().unwrap();
+    let filtered: Vec<Estimate> = time_s.iter().zip(&ohm).map(|(t, ohm)| filter.step(*t, *ohm).unwrap()).collect();
+    let (smoothed, filtered) = (smoothed.last().unwrap(), filtered.last().unwrap());
+    assert_eq!((smoothed.strain, smoothed.strain_sd), (filtered.strain, filtered.strain_sd));
+}
+
 #[test]
 fn an_error_leaves_the_filter_as_it_was() {
     let sensor = sensor();

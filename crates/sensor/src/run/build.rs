@@ -1,5 +1,6 @@
 use std::sync::Arc;
 
+use ohmstrain_ekf::correction::FeatureScale;
 use ohmstrain_ekf::live::{
     DoubtParts, LiveParts, Protections, RestBounds, SensorEstimator, Sieve, StaticCurve, Unread,
 };
@@ -131,9 +132,7 @@ impl<'a> FilterParts<'a> {
 
     /// Builds the filter, with the learned correction if there is one.
     pub fn filter(self, learned: Option<&Arc<Learned>>) -> Result<Box<dyn Filter>, SensorError> {
-        let shared = |learned: &Arc<Learned>| (learned.readings, SharedCorrection(Arc::clone(&learned.filter)));
-        let learned = learned.map(shared);
-        Ok(self.running(self.parts.with_correction(learned), None)?)
+        Ok(self.running(self.parts.with_correction(learned.map(of_filter)), None)?)
     }
 
     /// Builds the smoother, with the learned correction if there is one.
@@ -141,7 +140,7 @@ impl<'a> FilterParts<'a> {
         let given = self.options.protections;
         let protections = Protections { second_look: false, following: false, doubts: false, ..given };
         let of_smoother = Self { options: Options { protections, ..self.options }, ..self };
-        Ok(of_smoother.running(self.parts.with_correction(None), learned.cloned())?)
+        Ok(of_smoother.running(self.parts.with_correction(learned.map(of_filter)), learned.cloned())?)
     }
 
     fn running(
@@ -193,6 +192,11 @@ impl<'a> FilterParts<'a> {
             }
         })
     }
+}
+
+/// Returns the correction of the filter, and the scale of its features.
+fn of_filter(learned: &Arc<Learned>) -> (FeatureScale<f64>, SharedCorrection) {
+    (learned.readings, SharedCorrection(Arc::clone(&learned.filter)))
 }
 
 /// Components around an estimator.

@@ -6,6 +6,7 @@ use ohmstrain_ekf::live::SURPRISING_NIS;
 use ohmstrain_ekf::{Gaussian, Reading, ReadingVerdict, StepError};
 
 use crate::params::correction::{FUTURE_FEATURES, smoother_inputs};
+use crate::run::last_rows::LastRows;
 use crate::run::learned::{Learned, OfSmoother};
 use crate::run::turns::Turns;
 use crate::run::{Output, Rows, SEGMENT, WayBack};
@@ -23,6 +24,7 @@ pub(crate) struct CorrectedWayBack<'a> {
     starts: Vec<Watched>,
     /// Features of the future.
     ahead: Watched,
+    filtered: LastRows,
 }
 
 /// Features of the readings, for the correction.
@@ -89,7 +91,7 @@ pub fn outputs(output: &Output) -> [f64; OUTPUTS] {
 
 impl<'a> CorrectedWayBack<'a> {
     /// Wraps the backward pass of a smoother over a recording.
-    pub(crate) fn new(back: Box<dyn WayBack + 'a>, learned: &Learned, rows: Rows<'a>) -> Self {
+    pub(crate) fn new(back: Box<dyn WayBack + 'a>, learned: &Learned, rows: Rows<'a>, filtered: LastRows) -> Self {
         let correction = Arc::clone(&learned.smoother);
         let mut starts = Vec::with_capacity(rows.len() / SEGMENT + 1);
         let mut past = Watched::new(learned.readings);
@@ -100,7 +102,7 @@ impl<'a> CorrectedWayBack<'a> {
             let (time_s, reading) = rows.get(row);
             past.step(time_s, CorrectionReading::plain(reading));
         }
-        Self { back, correction, rows, starts, ahead: Watched::new(learned.readings.future()) }
+        Self { back, correction, rows, starts, ahead: Watched::new(learned.readings.future()), filtered }
     }
 
     /// Corrects a smoothed row. After the last reading, the future is taken as settled, as at the last reading.
@@ -141,7 +143,7 @@ impl WayBack for CorrectedWayBack<'_> {
                 let least = [known, self.ahead.known_variance].into_iter().flatten().reduce(f64::min).unwrap_or(0.0);
                 strain.variance += (smoothed.variance - least).max(0.0);
             }
-            output.estimate.strain = strain;
+            output.estimate.strain = self.filtered.mixed(row, time_s, strain);
         }
         Ok(Some(rows))
     }

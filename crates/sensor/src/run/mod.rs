@@ -5,6 +5,7 @@ pub(crate) mod build;
 mod clock;
 pub(crate) mod corrected;
 pub(crate) mod known;
+mod last_rows;
 pub(crate) mod learned;
 pub(crate) mod options;
 mod pending;

@@ -1,12 +1,13 @@
 use std::mem;
 use std::ops::Range;
 
-use ohmstrain_ekf::StepError;
-use ohmstrain_ekf::live::{Measured, Memory, SensorEstimator};
+use ohmstrain_ekf::live::{LiveRow, Measured, Memory, SensorEstimator};
+use ohmstrain_ekf::{Gaussian, StepError};
 
 use crate::run::backward::Backward;
 use crate::run::clock::Clock;
 use crate::run::corrected::CorrectedWayBack;
+use crate::run::last_rows::LastRows;
 use crate::run::pending::LiveStep;
 use crate::run::running::Running;
 use crate::run::turns::Turns;
@@ -33,47 +34,52 @@ impl<'a, E, const B: usize, const N: usize, const L: usize> Segments<'a, E, B, N
 where
     E: SensorEstimator<f64, N, L>,
 {
-    /// Filters the recording.
-    pub(crate) fn new(running: &'a mut Running<E, B, N, L>, rows: Rows<'a>) -> Result<Self, (usize, StepError)> {
+    /// Filters the recording; `watch` receives each row's index and the filter's strain.
+    pub(crate) fn new(
+        running: &'a mut Running<E, B, N, L>,
+        rows: Rows<'a>,
+        mut watch: impl FnMut(usize, Gaussian<f64>),
+    ) -> Result<Self, (usize, StepError)> {
         let mut starts = Vec::with_capacity(rows.len() / SEGMENT + 1);
         let last = rows.len().saturating_sub(1) / SEGMENT * SEGMENT;
         let mut turns = Turns::default();
+        let mut watch = |running: &Running<E, B, N, L>, row, taken: &LiveRow<f64, E::State>| {
+            running.watch(&mut turns, rows.get(row).0, &taken.measured);
+            watch(row, taken.stated);
+        };
         for row in 0..last {
             if row % SEGMENT == 0 {
                 starts.push((running.clock, running.live.memory()));
             }
             let (time_s, reading) = rows.get(row);
             let taken = running.row(time_s, reading).map_err(|error| (row, error))?;
-            running.watch(&mut turns, time_s, &taken.measured);
+            watch(running, row, &taken);
         }
         if last < rows.len() {
             starts.push((running.clock, running.live.memory()));
         }
         let mut steps = Vec::new();
-        let watch = |running: &Running<E, B, N, L>, time_s, measured: &Measured<f64>| {
-            running.watch(&mut turns, time_s, measured)
-        };
         steps_of(running, rows, last..rows.len(), &mut steps, watch)?;
         let back = Backward::new(running.live.state().clone());
         Ok(Self { running, rows, starts, back, steps, is_last: true, turns })
     }
 }
 
-/// Filters a segment from the current state, and keeps its steps; `after` is called with the time, s, and the result of
+/// Filters a segment from the current state, and keeps its steps; `after` is called with the index and the result of
 /// each.
 fn steps_of<E: SensorEstimator<f64, N, L>, const B: usize, const N: usize, const L: usize>(
     running: &mut Running<E, B, N, L>,
     rows: Rows<'_>,
     segment: Range<usize>,
     steps: &mut Vec<(Measured<f64>, LiveStep<E, N, L>)>,
-    mut after: impl FnMut(&Running<E, B, N, L>, f64, &Measured<f64>),
+    mut after: impl FnMut(&Running<E, B, N, L>, usize, &LiveRow<f64, E::State>),
 ) -> Result<(), (usize, StepError)> {
     steps.clear();
     steps.reserve_exact(segment.len());
     for row in segment {
         let (time_s, reading) = rows.get(row);
         let (taken, step) = running.kept_row(time_s, reading).map_err(|error| (row, error))?;
-        after(running, time_s, &taken.measured);
+        after(running, row, &taken);
         steps.push((taken.measured, step));
     }
     Ok(())
@@ -113,11 +119,9 @@ where
     E: SensorEstimator<f64, N, L, State: Send, Prepared: Send> + Send,
 {
     fn way_back<'a>(&'a mut self, rows: Rows<'a>) -> Result<Box<dyn WayBack + 'a>, (usize, StepError)> {
-        let learned = self.learned.clone();
-        let back = Box::new(Segments::new(self, rows)?);
-        match learned {
-            Some(learned) => Ok(Box::new(CorrectedWayBack::new(back, &learned, rows))),
-            None => Ok(back),
-        }
+        let Some(learned) = self.learned.clone() else { return Ok(Box::new(Segments::new(self, rows, |_, _| {})?)) };
+        let mut filtered = LastRows::of(rows);
+        let back = Segments::new(self, rows, |row, strain| filtered.watch(row, strain))?;
+        Ok(Box::new(CorrectedWayBack::new(Box::new(back), &learned, rows, filtered)))
     }
 }
