@@ -106,6 +106,8 @@ impl Metadata {
     /// Keys with a meaning in a trace.
     pub(crate) const KEYS: [&str; 6] =
         ["material", "gauge_length_mm", "front_end", "joint", "strain_unit", "resistance_unit"];
+    /// Key of the clock's unit. Only its value `s` has a meaning.
+    pub const TIME_UNIT: &str = "time_unit";
 
     /// Returns the metadata with the units of numbers after reading, if a file states units.
     pub(crate) fn in_own_units(&self) -> Self {

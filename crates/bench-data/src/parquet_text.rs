@@ -1,8 +1,10 @@
 use std::fs::File;
 use std::io::{self, Cursor, Read};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use parquet::errors::ParquetError;
+use parquet::file::metadata::FileMetaData;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::reader::RowIter;
 use parquet::record::{Field, Row};
@@ -53,18 +55,11 @@ impl ParquetText {
     /// # Errors
     /// If it is not a Parquet file, or its metadata on the recording are invalid.
     pub fn new(file: File) -> io::Result<Self> {
-        let reader = SerializedFileReader::new(file).map_err(broken)?;
+        let reader = guarded(|| SerializedFileReader::new(file).map_err(broken))?;
         let described = reader.metadata().file_metadata();
-        let mut metadata = Metadata::default();
-        for pair in described.key_value_metadata().into_iter().flatten() {
-            if let Some(value) = pair.value.as_ref().filter(|_| Metadata::KEYS.contains(&pair.key.as_str())) {
-                let taken = metadata.take_line(&format!("# {} = {value}", pair.key));
-                taken
-                    .map_err(|fault| io::Error::other(format!("expected {}, found {}", fault.expected, fault.found)))?;
-            }
-        }
+        let metadata = metadata_of(described)?;
         let is_known =
-            |field: &Type| field.is_primitive() && Column::ALL.iter().any(|known| known.name() == field.name());
+            |field: &Type| field.is_primitive() && Column::ALL.iter().any(|known| known.name() == field.name().trim());
         let root = described.schema().name().to_owned();
         let fields = described.schema().get_fields();
         let is_read = fields.iter().map(|field| is_known(field)).collect();
@@ -90,8 +85,9 @@ impl ParquetText {
     /// Returns the text of some more rows; empty at the end.
     fn more(&mut self, mut text: Vec<u8>) -> io::Result<Vec<u8>> {
         text.clear();
-        for row in self.rows.by_ref().take(ROWS_AT_ONCE) {
-            push_row(&row.map_err(broken)?, &self.is_read, &mut text);
+        for _ in 0..ROWS_AT_ONCE {
+            let Some(row) = guarded(|| self.rows.next().transpose().map_err(broken))? else { break };
+            push_row(&row, &self.is_read, &mut text);
         }
         Ok(text)
     }
@@ -105,6 +101,24 @@ impl Read for ParquetText {
         }
         self.pending.read(out)
     }
+}
+
+/// Returns the recording's metadata: those pairs whose key has a meaning in a trace.
+pub(crate) fn metadata_of(described: &FileMetaData) -> io::Result<Metadata> {
+    let mut metadata = Metadata::default();
+    let is_known = |key: &str| Metadata::KEYS.contains(&key) || key == Metadata::TIME_UNIT;
+    for pair in described.key_value_metadata().into_iter().flatten() {
+        if let Some(value) = pair.value.as_ref().filter(|_| is_known(&pair.key)) {
+            let taken = metadata.take_line(&format!("# {} = {value}", pair.key));
+            taken.map_err(|fault| {
+                io::Error::new(
+                    io::ErrorKind::InvalidData,
+                    format!("expected {}, found {}", fault.expected, fault.found),
+                )
+            })?;
+        }
+    }
+    Ok(metadata)
 }
 
 fn push_row(row: &Row, is_read: &[bool], out: &mut Vec<u8>) {
@@ -148,7 +162,16 @@ fn end_line(out: &mut [u8]) {
     }
 }
 
+/// Calls the library, which panics on some damaged files.
+fn guarded<T>(read: impl FnOnce() -> io::Result<T>) -> io::Result<T> {
+    let damaged = |_| Err(io::Error::new(io::ErrorKind::InvalidData, DAMAGED));
+    catch_unwind(AssertUnwindSafe(read)).unwrap_or_else(damaged)
+}
+
+/// Message on a file on which the library has panicked.
+pub(crate) const DAMAGED: &str = "as Parquet: expected pages of values, found others";
+
 /// Returns the error for a file that is not Parquet, or another kind of it.
 pub(crate) fn broken(error: ParquetError) -> io::Error {
-    io::Error::other(format!("cannot be read as Parquet: {error}"))
+    io::Error::new(io::ErrorKind::InvalidData, format!("as Parquet: {error}"))
 }

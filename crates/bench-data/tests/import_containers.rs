@@ -196,6 +196,17 @@ fn arrays_of_numpy() {
 }
 
 #[test]
+fn names_of_numpy_fields_may_be_latin_1() {
+    let header = "{'descr': [('time_s', '<f8'), ('R_kohm', '<f8'), ('strain', '<f8'), ('Temp (°C)', '<f8')], \
+                  'fortran_order': False, 'shape': (40,), }\n";
+    let header: Vec<u8> = header.chars().map(|c| c as u8).collect();
+    let rows = (0..40).flat_map(|row| [time_s(row), kiloohm(row), strain(row), 21.5]);
+    let data: Vec<u8> = rows.flat_map(f64::to_le_bytes).collect();
+    let array = [b"\x93NUMPY\x01\0", &(header.len() as u16).to_le_bytes()[..], &header, &data].concat();
+    assert_eq!(import(array, &Recipe::default()).temperature_c, Some(vec![21.5; 40]));
+}
+
+#[test]
 fn a_file_without_a_table_is_refused_in_one_line() {
     for bytes in [
         b"PAR1 is all".to_vec(),

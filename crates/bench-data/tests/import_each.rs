@@ -38,6 +38,14 @@ fn columns(header: &str, recipe: &Recipe, expected: &str) -> EachTrace {
 }
 
 #[test]
+fn the_temperature_is_that_of_all_channels() {
+    let header = "time_s,thumb_ohm,index_ohm,thumb_deg,index_deg,temperature_c";
+    let trace =
+        columns(header, &Recipe::default(), "time_s,thumb_ohm,index_ohm,thumb_angle_deg,index_angle_deg,temperature_c");
+    assert_eq!(trace.values.last().unwrap(), &[0.0, 50.0, 100.0]);
+}
+
+#[test]
 fn references_share_the_stem_of_their_channel() {
     let none = Recipe::default();
     let joints = "time_s,thumb_ohm,index_ohm,thumb_angle_deg,index_angle_deg";

@@ -2,7 +2,7 @@
 
 use ohmstrain_bench_data::import::Recipe;
 
-use crate::import_files::{decimal, file, is_imported, truth};
+use crate::import_files::{decimal, file, is_imported, proposed, truth};
 
 fn object(ms: i64, ohm: i64, strain: i64) -> String {
     format!(
@@ -22,6 +22,31 @@ fn an_object_for_each_row() {
     // A board also prints other text.
     let mixed = file("{\"boot\": \n", object);
     is_imported("mixed.jsonl", mixed, &Recipe::default());
+}
+
+/// A JSON number of 17 digits is the same number as in a CSV.
+#[test]
+fn numbers_are_rounded_once() {
+    let text = file("", |ms, _, strain| {
+        format!(
+            "{{\"time_s\": {}, \"resistance_ohm\": 1600.2220009926900355, \"strain\": {}}}",
+            decimal(ms, 3, '.'),
+            decimal(strain, 4, '.')
+        )
+    });
+    let (_, imported) = proposed(&[("a.jsonl", text.into_bytes())], &Recipe::default()).unwrap();
+    let text = file("", |ms, _, strain| {
+        format!(
+            "{{\"time_s\": {}, \"resistance_ohm\": 0.22200099269003554, \"strain\": {}}}",
+            decimal(ms, 3, '.'),
+            decimal(strain, 4, '.')
+        )
+    });
+    let (_, other) = proposed(&[("a.jsonl", text.into_bytes())], &Recipe::default()).unwrap();
+    assert_eq!(
+        (imported.trace.readings.values[0], other.trace.readings.values[0]),
+        (1_600.222_000_992_69, 0.222_000_992_690_035_54)
+    );
 }
 
 #[test]

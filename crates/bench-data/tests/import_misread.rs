@@ -224,3 +224,61 @@ fn labview_files_have_the_units_of_their_header_and_one_step() {
     let segment = text.split_once("Channels").unwrap().1.replace("kOhm", "Ohm");
     asks(&[("two.lvm", &format!("{text}Channels{segment}"))], &Recipe::default(), &["as above", "Resistance (Ohm)"]);
 }
+
+#[test]
+fn a_group_of_thousands_does_not_begin_with_a_zero() {
+    let mut text = file("Time (s);R (kOhm);Strain (%)\n", |ms, ohm, strain| {
+        let time = decimal(ms, 3, '.');
+        format!("{time};{};{}", decimal(ohm - 15_500, 3, ','), decimal(strain, 2, '.'))
+    });
+    text.push_str("3.5;0,950;0.5\n");
+    asks(&[("a.csv", &text)], &Recipe::default(), &["a.csv", "`0,"]);
+}
+
+#[test]
+fn a_unit_may_have_a_mark_in_it() {
+    for heading in ["Strain / mm/mm", "Strain_mm/mm", "Strain, mm/mm", "Strain mm/mm", "Strain (mm/mm)"] {
+        let row =
+            |ms, ohm, strain| format!("{},{},{}", decimal(ms, 3, '.'), decimal(ohm, 1, '.'), decimal(strain, 4, '.'));
+        let text =
+            file(&format!("Time (s);R (Ohm);{heading}\n"), |ms, ohm, strain| row(ms, ohm, strain).replace(',', ";"));
+        is_imported("a.csv", text, &Recipe::default());
+    }
+}
+
+#[test]
+fn the_letter_of_a_unit_may_stand_after_a_blank() {
+    let truth = truth();
+    let mut text = String::from("Time h,R Ohm,Strain %,Temperature K\n");
+    for (k, (ohm, strain)) in truth.ohm().iter().zip(truth.strain()).enumerate() {
+        writeln!(text, "{},{ohm},{},300.15", k as f64 / 4096.0, 100.0 * strain).unwrap();
+    }
+    let (_, imported) = proposed(&[("a.csv", text.into_bytes())], &Recipe::default()).unwrap();
+    let expected: Vec<f64> = (0..60).map(|k| f64::from(k) * 3600.0 / 4096.0).collect();
+    assert_eq!(imported.trace.time_s, expected);
+    assert!(imported.trace.temperature_c.unwrap().iter().all(|celsius| (celsius - 27.0).abs() < 1e-12));
+}
+
+#[test]
+fn a_row_without_a_value_below_the_header_is_no_header() {
+    for row in [",,", "NaN,NaN,NaN", "-,-,-\n,,"] {
+        let text = file(&format!("Time (s),R (Ohm),Strain (%)\n{row}\n"), seconds_ohms_percent);
+        is_imported("a.csv", text, &Recipe::default());
+    }
+}
+
+#[test]
+fn any_heading_may_have_a_line_end() {
+    let row = |ms, ohm, strain| seconds_ohms_percent(ms, ohm, strain) + ",";
+    let text = file("Time (s),R (Ohm),Strain (%),\"note\nof the day\"\n", row);
+    is_imported("a.csv", text, &Recipe::default());
+}
+
+#[test]
+fn the_deviation_of_a_reference_stays_with_it() {
+    let row =
+        |ms, ohm, strain| format!("{},{},{},0.5", decimal(ms, 3, '.'), decimal(ohm, 1, '.'), decimal(strain, 2, '.'));
+    let text = file("# strain_unit = percent\ntime_s,resistance_ohm,strain,strain_sd\n", row);
+    let imported = is_imported("a.csv", text, &Recipe::default());
+    assert_eq!(imported.trace.reference.unwrap().sd, vec![0.005; 60]);
+}

@@ -4,9 +4,11 @@ use std::fs::{self, File};
 use std::path::Path;
 use std::sync::Arc;
 
+use ohmstrain_bench_data::import::{Plan, Recipe, read_table};
 use ohmstrain_bench_data::{ParquetText, Trace};
 use parquet::basic::Compression;
 use parquet::data_type::{DoubleType, FloatType, Int32Type};
+use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::parser::parse_message_type;
@@ -15,11 +17,18 @@ const ROWS: usize = 40;
 
 /// Returns times in whole seconds, ohms in single precision, every seventh of them missing, strain, and an unrelated column.
 fn parquet(root: &str, compression: Compression) -> Vec<u8> {
+    described(root, compression, &[])
+}
+
+/// The same, with key-value metadata.
+fn described(root: &str, compression: Compression, metadata: &[(&str, &str)]) -> Vec<u8> {
     let schema = format!(
         "message {root} {{ OPTIONAL INT32 time_s; OPTIONAL FLOAT resistance_ohm; REQUIRED DOUBLE strain; OPTIONAL INT32 note; }}"
     );
     let schema = Arc::new(parse_message_type(&schema).unwrap());
-    let properties = WriterProperties::builder().set_compression(compression).set_dictionary_enabled(true).build();
+    let properties = WriterProperties::builder().set_compression(compression).set_dictionary_enabled(true);
+    let pairs = metadata.iter().map(|(key, value)| KeyValue::new((*key).to_owned(), (*value).to_owned())).collect();
+    let properties = properties.set_key_value_metadata(Some(pairs)).build();
     let mut writer = SerializedFileWriter::new(Vec::new(), schema, Arc::new(properties)).unwrap();
     let mut group = writer.next_row_group().unwrap();
     let times: Vec<i32> = (0..ROWS as i32).collect();
@@ -52,6 +61,46 @@ fn ohm(row: usize) -> f32 {
 
 fn strain(row: usize) -> f64 {
     0.01 * (row % 5) as f64
+}
+
+/// A trace and an import of the same file: whoever states the unit in the file need not state it again.
+#[test]
+fn key_value_metadata_count_for_traces_and_imports() {
+    let lines = [("resistance_unit", "kohm"), ("strain_unit", "percent"), ("time_unit", "s"), ("pandas", "{}")];
+    let bytes = described("schema", Compression::SNAPPY, &lines);
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("described-{}.parquet", std::process::id()));
+    fs::write(&path, &bytes).unwrap();
+    let text = ParquetText::new(File::open(&path).unwrap()).unwrap();
+    assert_eq!(text.metadata().other, [("time_unit".to_owned(), "s".to_owned())]);
+    let read = Trace::read(text, "read").unwrap_or_else(|error| panic!("{error}"));
+    fs::remove_file(path).unwrap();
+    let recipe = Recipe::default();
+    let tables = [read_table(bytes, "imported.parquet", &recipe.read_options(0)).unwrap()];
+    let imported = Plan::propose(&tables, &recipe).unwrap().import(&tables).unwrap().trace;
+    assert_eq!(
+        imported.readings.values[0],
+        1000.0 * f64::from(ohm(0).to_string().parse::<f32>().unwrap()).round() + 100.0
+    );
+    assert_eq!(imported.reference.unwrap().values[1], 0.01 * 0.01);
+    assert_eq!(read.len(), ROWS);
+}
+
+/// Whatever byte of a file is damaged: an error, or other numbers, and no panic.
+#[test]
+fn a_damaged_file_is_an_error() {
+    let bytes = parquet("schema", Compression::SNAPPY);
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("damaged-{}.parquet", std::process::id()));
+    for place in 4..bytes.len() {
+        for bit in [0x01, 0x80] {
+            let mut damaged = bytes.clone();
+            damaged[place] ^= bit;
+            fs::write(&path, damaged).unwrap();
+            if let Ok(text) = ParquetText::new(File::open(&path).unwrap()) {
+                let _ = Trace::read(text, "damaged");
+            }
+        }
+    }
+    fs::remove_file(path).unwrap();
 }
 
 #[test]

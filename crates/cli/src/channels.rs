@@ -13,6 +13,8 @@ use crate::whole_file;
 pub const ONE_CHANNEL: [&str; 3] = ["resistance_ohm", "resistance_ratio", "adc"];
 /// Columns of a recording that every channel keeps.
 pub const KEPT: [&str; 3] = ["time_s", "time_us", "temperature_c"];
+/// The mark with which spreadsheet programs begin a CSV in UTF-8.
+const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
 /// Endings of columns of readings, each with its column in a recording of one channel.
 const READINGS: [(&str, &str); 3] = [("_ohm", "resistance_ohm"), ("_ratio", "resistance_ratio"), ("_adc", "adc")];
 /// Endings of columns of references, each with its column in a recording of one channel.
@@ -48,13 +50,17 @@ impl Table {
         if whole_file::is_stdin(path) || !path.is_file() {
             return Ok(None);
         }
-        let bytes = whole_file::bytes(path)?;
+        let mut bytes = whole_file::bytes(path)?;
+        if bytes.starts_with(BYTE_ORDER_MARK) {
+            bytes.drain(..BYTE_ORDER_MARK.len());
+        }
         if ParquetText::is_one(&bytes) {
             return Ok(None);
         }
         let Some(header) = header(&bytes) else { return Ok(None) };
         let text = String::from_utf8_lossy(&bytes[header.0..header.1]);
-        let columns: Vec<String> = text.split(',').map(|name| name.trim().to_owned()).collect();
+        let columns: Vec<String> =
+            text.split(',').map(|name| name.trim().trim_matches('"').trim().to_owned()).collect();
         let readings = columns.iter().filter(|name| reading(name).is_some()).count();
         if readings < 2 || columns.iter().any(|name| ONE_CHANNEL.contains(&name.as_str())) {
             return Ok(None);

@@ -141,6 +141,10 @@ impl From<TraceError> for CliError {
                 Self::Input(format!("{content}; see `ohmstrain inspect {}`", shell_word(&content.file)))
             }
             TraceError::Content(_) => Self::Input(error.to_string()),
+            // Damaged content of a container.
+            TraceError::Io { ref source, .. } if source.kind() == io::ErrorKind::InvalidData => {
+                Self::Input(error.to_string())
+            }
             _ => Self::Other(error.to_string()),
         }
     }

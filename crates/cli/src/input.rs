@@ -41,7 +41,7 @@ pub fn text_of(path: &Path, overrides: &Metadata) -> Result<(Box<dyn Read>, Meta
 }
 
 fn text_of_parquet(path: &Path, overrides: &Metadata) -> Result<(Box<dyn Read>, Metadata), CliError> {
-    let unreadable = |error| CliError::Input(format!("{}: {error}", path.display()));
+    let unreadable = |error| CliError::Input(format!("{}: cannot be read {error}", path.display()));
     let file = File::open(path).map_err(|error| CliError::file("read", path, &error))?;
     let text = ParquetText::new(file).map_err(unreadable)?;
     let mut metadata = text.metadata().clone();

@@ -251,6 +251,8 @@ fn a_sensor_file_that_is_none_is_refused_alike_by_every_command() {
     let word = swap(&sensor, "rest_reading = ", "rest_reading = \"high\"");
     let negative = swap(&sensor, "rest_reading = ", "rest_reading = -1600.0");
     let nan = swap(&sensor, "rest_reading = ", "rest_reading = nan");
+    let endless = swap(&sensor, "longest_repeat_s = ", "longest_repeat_s = inf");
+    let far = swap(&sensor, "measured_rest = ", "measured_rest = 1e9");
     let limits = swap(&sensor, "upper = ", "upper = -1.0");
     let tau = swap(&sensor, "tau_s = ", "tau_s = -2.0");
     let family = swap(&sensor, "family = \"polynomial\"", "family = \"spline\"");
@@ -267,6 +269,11 @@ fn a_sensor_file_that_is_none_is_refused_alike_by_every_command() {
             format!(":{}: column 16: field `rest_reading`: expected 1e-12 to 1e12, found -1600", negative.1),
         ),
         (nan.0.into(), format!(":{}: column 16: field `rest_reading`: expected 1e-12 to 1e12, found NaN", nan.1)),
+        (
+            endless.0.into(),
+            format!(":{}: column 20: field `validity.longest_repeat_s`: expected 0 to 1e12, found inf", endless.1),
+        ),
+        (far.0.into(), format!(":{}: column 17: field `measured_rest`: expected ", far.1)),
         (
             limits.0.into(),
             format!(":{}: column 9: field `limits.upper`: expected more than `lower`, 0, found -1", limits.1),

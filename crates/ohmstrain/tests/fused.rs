@@ -50,9 +50,12 @@ fn a_fusion_of_format_1_fuses_filters_but_no_smoothers() {
         refused.to_string(),
         "expected a fusion of smoothers; calibrate again, with an estimator that has a smoother"
     );
-    let wrong = FORMAT_1.replace("error_covariance = [[1.0, 0.5], [0.5, 1.0]]", "error_covariance = [[1.0, 0.5]]");
-    let refused = FusedSensor::from_toml(vec![sensor(), sensor()], &wrong).unwrap_err();
-    assert!(refused.to_string().contains("errors.covariance"), "{refused}");
+    // Too short, a negative variance, not symmetric, a correlation of one.
+    for wrong in ["[[1.0, 0.5]]", "[[-5.0, 0.5], [0.5, 1.0]]", "[[1.0, 0.5], [0.4, 1.0]]", "[[1.0, 1.0], [1.0, 1.0]]"] {
+        let text = FORMAT_1.replace("[[1.0, 0.5], [0.5, 1.0]]", wrong);
+        let refused = FusedSensor::from_toml(vec![sensor(), sensor()], &text).unwrap_err();
+        assert!(refused.to_string().contains("errors.covariance"), "{wrong}: {refused}");
+    }
 }
 
 /// A fused smoother is that of each channel, weighted; more readings than times are refused.

@@ -185,7 +185,7 @@ impl TraceFile {
         let knows_ohm = metadata.resistance_unit.is_some() || self.trace.readings.converter.is_some();
         one = if metadata.strain_unit.is_some() { one.strain_unit_is_known() } else { one };
         one = if knows_ohm { one.resistance_unit_is_known() } else { one };
-        let is_clock = |(key, value): &(String, String)| key == "time_unit" && value == "s";
+        let is_clock = |(key, value): &(String, String)| key == Metadata::TIME_UNIT && value == "s";
         one = if metadata.other.iter().any(is_clock) { one.clock_is_known() } else { one };
         Ok(self.joint().map_or(one, |joint| one.on_joint(joint)))
     }

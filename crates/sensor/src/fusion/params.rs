@@ -1,3 +1,4 @@
+use nalgebra::DMatrix;
 use ohmstrain_model::StrainRange;
 use serde::{Deserialize, Serialize};
 
@@ -141,7 +142,12 @@ impl FusionErrors {
         self.covariance.iter().try_for_each(|of_member| {
             table.length("covariance", members, of_member.len())?;
             table.numbers("covariance", of_member, COVARIANCE)
-        })
+        })?;
+        let matrix = DMatrix::from_fn(members, members, |i, j| self.covariance[i][j]);
+        if matrix == matrix.transpose() && matrix.cholesky().is_some() {
+            return Ok(());
+        }
+        Err(table.wrong("covariance", "a symmetric, positive definite matrix", "another one"))
     }
 }
 

@@ -10,7 +10,7 @@ use ohmstrain_model::{Gauge, StrainRange};
 pub use table::FieldError;
 use table::{
     AMOUNT, ANY_NUMBER, Allowed, FACTOR, GAIN, LARGEST_CHANGE, NON_NEGATIVE, POSITIVE, RATE, SHARE, SIGNED, SPREAD,
-    Table, check, short,
+    Table, ZERO_OR_POSITIVE, check, short,
 };
 
 use crate::params::estimator::{EstimatorParams, MotionParams, NoiseParams, PhaseParams};
@@ -68,11 +68,15 @@ impl SensorParams {
     fn check_rest(&self, root: &Table) -> Result<(), FieldError> {
         let Validity { reading_lower, reading_upper, .. } = self.validity;
         let (least, most) = (reading_lower / REST_BEYOND, reading_upper * REST_BEYOND);
-        if (least..=most).contains(&self.rest_reading) {
-            return Ok(());
+        let named = [("rest_reading", Some(self.rest_reading)), ("measured_rest", self.measured_rest)];
+        let given = named.into_iter().filter_map(|(name, reading)| Some((name, reading?)));
+        match given.into_iter().find(|(_, reading)| !(least..=most).contains(reading)) {
+            None => Ok(()),
+            Some((name, reading)) => {
+                let expected = format!("{} to {}, near the readings of `validity`", short(least), short(most));
+                Err(root.wrong(name, expected, short(reading)))
+            }
         }
-        let expected = format!("{} to {}, near the readings of `validity`", short(least), short(most));
-        Err(root.wrong("rest_reading", expected, short(self.rest_reading)))
     }
 }
 
@@ -148,7 +152,7 @@ impl Validity {
         ends(table, ["reading_lower", "reading_upper"], self.reading_lower, self.reading_upper, POSITIVE)?;
         check!(
             table, self;
-            fastest_rate_per_s: NON_NEGATIVE, duration_s: NON_NEGATIVE, longest_repeat_s: NON_NEGATIVE,
+            fastest_rate_per_s: ZERO_OR_POSITIVE, duration_s: ZERO_OR_POSITIVE, longest_repeat_s: ZERO_OR_POSITIVE,
         )?;
         table.some("longest_unturned_s", self.longest_unturned_s, POSITIVE)?;
         self.resolution.map_or(Ok(()), |resolution| resolution.validate(&table.table("resolution")))
@@ -157,7 +161,7 @@ impl Validity {
 
 impl Resolution {
     fn validate(self, table: &Table) -> Result<(), FieldError> {
-        check!(table, self; step: NON_NEGATIVE, noise_sd: NON_NEGATIVE)
+        check!(table, self; step: ZERO_OR_POSITIVE, noise_sd: ZERO_OR_POSITIVE)
     }
 }
 

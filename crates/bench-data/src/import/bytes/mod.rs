@@ -19,6 +19,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use crate::ParquetText;
 use crate::import::error::ImportError;
+use crate::metadata::Metadata;
+use crate::parquet_text::DAMAGED;
 
 use bounds::{LARGEST_FILE, MOST_WRAPPINGS, mib};
 pub use cell::Cells;
@@ -32,8 +34,8 @@ pub(crate) enum Contents {
     /// Text and its encoding.
     Text(String, &'static str),
     Sheets(NamedSheets),
-    /// Columns, all with the same number of rows, and the name of the container.
-    Columns(Vec<RawColumn>, &'static str),
+    /// Columns, all with the same number of rows, the metadata, and the name of the container.
+    Columns(Vec<RawColumn>, Metadata, &'static str),
 }
 
 /// Returns the contents of a file of any kind, and a prefix for its packing, such as `gzip, `. `sheet` is the requested sheet of a
@@ -55,7 +57,7 @@ pub(crate) fn open(mut bytes: Vec<u8>, name: &str, sheet: Option<&str>) -> Resul
             match guarded(name, broken, || archive::read(&bytes, name, wanted))? {
                 archive::Packed::File(file) => bytes = file,
                 archive::Packed::Arrays(columns) => {
-                    return Ok((Contents::Columns(columns, "NumPy"), wrappings.concat()));
+                    return Ok((Contents::Columns(columns, Metadata::default(), "NumPy"), wrappings.concat()));
                 }
             }
             wrappings.push(ZIP);
@@ -76,16 +78,16 @@ const NO_WORKBOOK: &str = "cannot be read as a workbook: expected records and pl
 /// Returns the contents of a file that is not packed.
 fn contents(bytes: Vec<u8>, name: &str, sheet: Option<&str>) -> Result<Contents, ImportError> {
     if ParquetText::is_one(&bytes) {
-        let expected = "cannot be read as Parquet: expected pages of values, found others";
-        let columns = guarded(name, expected, || parquet::read(bytes, name))?;
-        return Ok(Contents::Columns(columns, "Parquet"));
+        let expected = format!("cannot be read {DAMAGED}");
+        let (columns, metadata) = guarded(name, &expected, || parquet::read(bytes, name))?;
+        return Ok(Contents::Columns(columns, metadata, "Parquet"));
     }
     if bytes.starts_with(PK) || bytes.starts_with(&workbook::XLS) {
         return guarded(name, NO_WORKBOOK, || workbook::read(&bytes, name, sheet)).map(Contents::Sheets);
     }
     if bytes.starts_with(numpy::MAGIC) {
         let columns = numpy::columns(&bytes, "").map_err(|error| ImportError::unreadable(name, error))?;
-        return Ok(Contents::Columns(columns, "NumPy"));
+        return Ok(Contents::Columns(columns, Metadata::default(), "NumPy"));
     }
     if let Some(refusal) = foreign::refusal(&bytes, name) {
         return Err(ImportError::unreadable(name, refusal));

@@ -11,6 +11,7 @@ const MOST_COLUMNS: usize = 1000;
 /// Returns the columns of an array, which is a table or a list of records; `name` is that of the array, if it has one.
 pub(crate) fn columns(bytes: &[u8], name: &str) -> Result<Vec<RawColumn>, String> {
     let (header, data) = header(bytes).ok_or("expected the header of a NumPy array, found another")?;
+    let header = header.as_str();
     let shape = shape(header).ok_or("expected the shape of a NumPy array, found none")?;
     let fields = fields(header).ok_or_else(|| {
         format!("expected an array of numbers, found one of {}", entry(header, "descr").unwrap_or("objects"))
@@ -52,14 +53,16 @@ pub(crate) fn columns(bytes: &[u8], name: &str) -> Result<Vec<RawColumn>, String
 }
 
 /// Returns the text of the header, a Python dictionary, and the bytes after it.
-fn header(bytes: &[u8]) -> Option<(&str, &[u8])> {
+fn header(bytes: &[u8]) -> Option<(String, &[u8])> {
     let behind = bytes.strip_prefix(MAGIC)?;
     let (length, start) = match behind.first()? {
         1 => (usize::from(u16::from_le_bytes(*behind.get(2..)?.first_chunk()?)), 4),
         _ => (u32::from_le_bytes(*behind.get(2..)?.first_chunk()?) as usize, 6),
     };
     let (header, data) = behind.get(start..)?.split_at_checked(length)?;
-    Some((std::str::from_utf8(header).ok()?, data))
+    // Versions 1 and 2 are in Latin-1, version 3 in UTF-8.
+    let latin_1 = || header.iter().copied().map(char::from).collect();
+    Some((String::from_utf8(header.to_vec()).unwrap_or_else(|_| latin_1()), data))
 }
 
 /// Returns the text after a key of the header.
@@ -89,7 +92,7 @@ fn fields(header: &str) -> Option<Vec<Field>> {
     let texts: Vec<&str> = list.split('\'').skip(1).step_by(2).collect();
     let field = |pair: &[&str]| Some(Field { name: pair[0].to_owned(), kind: Kind::of(pair.get(1)?)? });
     // A field with a shape of its own is more than a single number.
-    let are_numbers = list.matches('(').count() * 2 == texts.len();
+    let are_numbers = list.matches("('").count() * 2 == texts.len() && !list.contains("', (");
     are_numbers.then(|| texts.chunks(2).map(field).collect())?
 }
 

@@ -7,7 +7,8 @@ use parquet::schema::types::Type;
 use crate::import::bytes::bounds::{LARGEST_FILE, check_cells, mib};
 use crate::import::bytes::cell::{Cell, Cells};
 use crate::import::error::ImportError;
-use crate::parquet_text::broken;
+use crate::metadata::Metadata;
+use crate::parquet_text::{broken, metadata_of};
 
 /// A column with a name and a unit from its container.
 pub(crate) struct RawColumn {
@@ -17,11 +18,13 @@ pub(crate) struct RawColumn {
     pub cells: Cells,
 }
 
-/// Reads the flat columns of a Parquet file, however its pages are compressed.
-pub(crate) fn read(bytes: Vec<u8>, name: &str) -> Result<Vec<RawColumn>, ImportError> {
-    let broken = |error| ImportError::unreadable(name, broken(error).to_string());
+/// Reads the flat columns and the metadata of a Parquet file, however its pages are compressed.
+pub(crate) fn read(bytes: Vec<u8>, name: &str) -> Result<(Vec<RawColumn>, Metadata), ImportError> {
+    let broken = |error| ImportError::unreadable(name, format!("cannot be read {}", broken(error)));
     let reader = SerializedFileReader::new(Bytes::from(bytes)).map_err(broken)?;
-    let fields = reader.metadata().file_metadata().schema().get_fields();
+    let described = reader.metadata().file_metadata();
+    let metadata = metadata_of(described).map_err(|error| ImportError::unreadable(name, error.to_string()))?;
+    let fields = described.schema().get_fields();
     let column =
         |field: &Type| RawColumn { heading: field.name().to_owned(), unit: time_unit(field), cells: Cells::default() };
     let mut columns: Vec<RawColumn> = fields.iter().map(|field| column(field)).collect();
@@ -41,7 +44,7 @@ pub(crate) fn read(bytes: Vec<u8>, name: &str) -> Result<Vec<RawColumn>, ImportE
     if rows == 0 {
         return Err(ImportError::unreadable(name, "expected rows of numbers, found none"));
     }
-    Ok(columns)
+    Ok((columns, metadata))
 }
 
 /// Returns the unit of a timestamp or a time of day, which are stored as counts.

@@ -70,7 +70,10 @@ fn quoted_head(text: &str) -> (Option<&str>, usize) {
     let is_open = |head: &str| head.matches('"').count() % 2 == 1;
     let ends = text.match_indices('\n').map(|(at, _)| at).take(MOST_LINES).zip(1..);
     let first = text.split('\n').next().unwrap_or_default();
-    if !text.starts_with('"') || !is_open(first) {
+    // The quotation mark that stays open begins a cell; within one it may be a sign for inches.
+    let begins_cell =
+        |at: usize| first[..at].trim_end_matches(' ').chars().next_back().is_none_or(|c| ",;\t".contains(c));
+    if !is_open(first) || !first.rfind('"').is_some_and(begins_cell) {
         return (None, 0);
     }
     let closed = ends.skip(1).find(|(end, _)| !is_open(&text[..*end]));

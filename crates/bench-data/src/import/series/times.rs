@@ -33,7 +33,7 @@ impl Times {
                 let seconds = (0..tables[*file].len()).map(|row| row as f64 / hz).collect();
                 Ok(Self { seconds, ..Self::default() })
             }
-            Clock::Column(channel) if channel.unit.scale == Scale::Stamp => stamps(tables, channel),
+            Clock::Column(channel) if channel.unit.scale == Scale::Stamp => stamps(tables, channel, own_missing),
             Clock::Column(channel) => counts(tables, channel, own_missing),
         }
     }
@@ -89,7 +89,7 @@ fn since_the_first(tables: &[Table], channel: &Channel, mut seconds: Vec<f64>, f
     Times { seconds, zero: Some((zero, cells.get(first).to_owned())), wraps: 0 }
 }
 
-fn stamps(tables: &[Table], channel: &Channel) -> Result<Times, ImportError> {
+fn stamps(tables: &[Table], channel: &Channel, own_missing: &[String]) -> Result<Times, ImportError> {
     let table = &tables[channel.place.file];
     let order = Order::ALL.into_iter().find(|order| order.unit() == channel.unit.name).unwrap_or(Order::Iso);
     let cells = &table.columns[channel.place.column].cells;
@@ -97,7 +97,7 @@ fn stamps(tables: &[Table], channel: &Channel) -> Result<Times, ImportError> {
     let mut first_read: Option<Stamp> = None;
     for (row, cell) in cells.iter().enumerate() {
         let read = stamp(cell, order);
-        if read.is_none() && !is_missing(cell, &[]) {
+        if read.is_none() && !is_missing(cell, own_missing) {
             let expected = format!("a date or a time of day in column {}", table.name(channel.place.column));
             return Err(ImportError::content(&table.file, table.lines[row], Fault::new(expected, quote(cell))));
         }

@@ -4,8 +4,9 @@ use crate::import::error::ImportError;
 use crate::import::table::data::{Data, Shape};
 use crate::import::table::grid::{Grid, MONITOR_CLOCK, Separator};
 use crate::import::table::records::Records;
+use crate::import::table::value::value_of;
 use crate::import::words::names::{self, is_quantity};
-use crate::import::words::{DecimalMark, units};
+use crate::import::words::{DecimalMark, Value, units};
 use crate::metadata::Metadata;
 
 /// Largest number of header lines above the data: two of names, one of units.
@@ -90,7 +91,8 @@ impl Header {
         data: &Data,
     ) -> Result<usize, ImportError> {
         let mut lines: Vec<(usize, Vec<String>)> = Vec::new();
-        let below = self.first_row - usize::from(self.first_row > first && is_process_line(grid, self.first_row - 1));
+        let is_passed = |row: usize| is_process_line(grid, row) || is_without_values(grid, row, decimal);
+        let below = (first..self.first_row).rev().find(|row| !is_passed(*row)).map_or(first, |row| row + 1);
         for row in (first..below).rev().take(MOST_HEADER_LINES) {
             let cells = if row + 1 == below {
                 let names = data.names_above(grid, decimal, below);
@@ -170,6 +172,13 @@ fn is_process_line(grid: &Grid, row: usize) -> bool {
     let cells = grid.cells(row);
     let mut filled = cells.iter().filter(|cell| !cell.is_empty()).peekable();
     filled.peek().is_some() && filled.all(|cell| PROCESSES.contains(&cell.to_string().to_lowercase().as_str()))
+}
+
+/// True if a line has cells, and no value in any of them: `,,`, `NaN;NaN`.
+fn is_without_values(grid: &Grid, row: usize, decimal: DecimalMark) -> bool {
+    let cells = grid.cells(row);
+    let is_missing = |cell: &Cell| value_of(cell, decimal, 0, &[]) == Value::Missing;
+    grid.comment(row).is_none() && cells.len() > 1 && cells.iter().all(is_missing)
 }
 
 /// True if all cells, apart from empty ones, are units, or short words beside at least as many units.

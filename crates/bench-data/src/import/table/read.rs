@@ -29,7 +29,7 @@ pub fn read_table(bytes: Vec<u8>, name: &str, options: &ReadOptions) -> Result<T
     let mut table = match contents {
         Contents::Text(text, encoding) => of_text(&text, encoding, name, options)?,
         Contents::Sheets(sheets) => of_sheets(sheets, name, options)?,
-        Contents::Columns(columns, format) => of_columns(columns, name, format),
+        Contents::Columns(columns, metadata, format) => Table { metadata, ..of_columns(columns, name, format) },
     };
     fractions::join(&mut table);
     date_column::join(&mut table);

@@ -7,7 +7,7 @@ use crate::columns::Column;
 use crate::counted::counted;
 use crate::error::{TraceError, quote};
 use crate::import::error::ImportError;
-use crate::import::roles::{Align, Channel, Decision, Timed};
+use crate::import::roles::{Align, Channel, Decision, FileColumn, Timed};
 use crate::import::series::{Series, Times, Values, alternation, check_positive, converted, folded, spurious_zeros};
 use crate::import::table::{Table, all_files};
 use crate::import::trace::plan::Plan;
@@ -50,7 +50,8 @@ impl Plan {
         let first = self.decision.readings[0];
         let mut work = Work { tables, plan: self, remarks: self.remarks.clone(), lag: None, duplicates: 0 };
         let (readings, alternation, zero) = work.readings(&first)?;
-        let mut columns = vec![(Role::Time, readings.time.clone()), (first.values.role, readings.value.clone())];
+        let mut columns =
+            vec![(Column::TimeS, readings.time.clone()), (column(first.values.role), readings.value.clone())];
         if let Some(timed) = reference {
             let align = self.recipe.align.unwrap_or(Align::None);
             let is_same = self.decision.is_one_clock() && align == Align::None;
@@ -58,11 +59,12 @@ impl Plan {
             if !is_same || self.recipe.fold_polarity {
                 work.check_reach(timed.values.place.file, &values)?;
             }
-            columns.push((timed.values.role, values));
+            columns.push((column(timed.values.role), values));
+            columns.extend(work.deviation(&timed.values, is_same, &readings)?);
         }
         if let Some(values) = *temperature {
             let timed = Timed { values, ..first };
-            columns.push((values.role, work.beside(&timed, true, Align::None, &readings, zero.as_ref())?));
+            columns.push((column(values.role), work.beside(&timed, true, Align::None, &readings, zero.as_ref())?));
         }
         work.mention_unused();
         work.mention_passed_over();
@@ -193,6 +195,35 @@ impl Work<'_> {
         Ok(series.at(&readings.time))
     }
 
+    /// Returns the standard deviation of a trace's reference, if the file has one. It is left out if it has other rows than the
+    /// readings.
+    fn deviation(
+        &mut self,
+        reference: &Channel,
+        is_same: bool,
+        readings: &Series,
+    ) -> Result<Option<(Column, Vec<f64>)>, ImportError> {
+        let place = reference.place;
+        let table = &self.tables[place.file];
+        let known = [(Column::Strain, Column::StrainSd), (Column::AngleDeg, Column::AngleSd)];
+        let is_named = |known: Column, column: usize| table.columns[column].heading.trim() == known.name();
+        let own = known.into_iter().find(|(of, _)| *of == column(reference.role) && is_named(*of, place.column));
+        let found = own.and_then(|(_, deviation)| {
+            Some((deviation, (0..table.columns.len()).find(|column| is_named(deviation, *column))?))
+        });
+        let Some((deviation, column)) = found else { return Ok(None) };
+        if !is_same || self.plan.recipe.fold_polarity {
+            self.remark(
+                place.file,
+                format!("column `{}` left out: the reference has a clock of its own", deviation.name()),
+            );
+            return Ok(None);
+        }
+        let channel = Channel { place: FileColumn { column, ..place }, ..*reference };
+        let values = Values::read(self.tables, &channel, &self.plan.recipe.missing)?.values;
+        Ok(Some((deviation, readings.row.iter().map(|row| values[*row]).collect())))
+    }
+
     /// Refuses a reference of another time than all readings, and mentions one that does not reach some of them.
     fn check_reach(&mut self, file: usize, values: &[f64]) -> Result<(), ImportError> {
         let unknown = values.iter().filter(|value| value.is_nan()).count();
@@ -248,9 +279,9 @@ impl Work<'_> {
 }
 
 /// Writes the trace's CSV and reads it back, so that all conversions and checks are those of the trace reader.
-fn trace(metadata: &Metadata, columns: &[(Role, Vec<f64>)], file: &str) -> Result<Trace, ImportError> {
+fn trace(metadata: &Metadata, columns: &[(Column, Vec<f64>)], file: &str) -> Result<Trace, ImportError> {
     let mut rows = RowWriter::new(metadata.to_string().into_bytes());
-    columns.iter().for_each(|(role, _)| rows.text(column(*role).name()));
+    columns.iter().for_each(|(column, _)| rows.text(column.name()));
     let io = |error: std::io::Error| ImportError::unreadable("import", error.to_string());
     rows.end().map_err(io)?;
     for row in 0..columns[0].1.len() {

@@ -132,6 +132,7 @@ impl EachPlan {
             values.push((0..trace.len()).map(|row| trace.readings.written(row)).collect());
             remarks.extend(own.iter().filter(|remark| !remarks.contains(remark)).cloned().collect::<Vec<_>>());
         }
+        let temperature_c = imported[0].trace.temperature_c.take();
         for (channel, Imported { trace, .. }) in self.channels.iter().zip(imported) {
             let Some(reference) = trace.reference else { continue };
             let quantity = Column::of_reference(reference.quantity).name();
@@ -140,6 +141,10 @@ impl EachPlan {
             if self.is_shared() {
                 break;
             }
+        }
+        if let Some(temperature_c) = temperature_c {
+            columns.push(Column::TemperatureC.name().to_owned());
+            values.push(temperature_c);
         }
         Ok(EachTrace { metadata, columns, values, remarks })
     }

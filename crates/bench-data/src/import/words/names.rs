@@ -19,11 +19,16 @@ pub(crate) fn take_apart(heading: &str) -> (String, Option<String>) {
         }
     }
     // `time_ms`, `R kOhm`, `Time / s`, `Weg, mm`: the unit is after the last mark. `R/R0` is a name.
-    for mark in ['/', ',', '_', ' '] {
-        if let Some((name, unit)) = heading.rsplit_once(mark)
-            && units::is_unit(unit)
+    const MARKS: [char; 4] = ['/', ',', '_', ' '];
+    let last = |mark: &char| heading.rsplit_once(*mark).map(|(name, unit)| (*mark, name, unit));
+    // A unit with a mark in it, `mm/mm`, comes before its own last part.
+    let fractions = heading.match_indices(MARKS).map(|(at, mark)| (&heading[..at], mark, &heading[at + mark.len()..]));
+    let fractions = fractions.filter(|(.., unit)| unit.contains('/'));
+    let fractions = fractions.filter_map(|(name, mark, unit)| Some((mark.chars().next()?, name, unit)));
+    for (mark, name, unit) in fractions.chain(MARKS.iter().filter_map(last)) {
+        if units::is_unit(unit)
             && !is_among(WORDS, &unit.trim().to_lowercase())
-            && unit.len() > 1 - usize::from(matches!(mark, '/' | ',' | '_'))
+            && (matches!(mark, '/' | ',' | '_') && !unit.is_empty() || unit.len() > 1 || is_letter_unit(name, unit))
             && !name.trim().is_empty()
             && (matches!(mark, '/' | ',') || is_sure_unit(name, unit.trim()))
         {
@@ -43,6 +48,16 @@ fn cased(name: &str, unit: &str) -> String {
 /// True if a text numbers columns of one kind: `strain_1`, `R (2)`.
 fn is_index(text: &str) -> bool {
     !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit())
+}
+
+/// True for the letter of a unit after a blank, where nothing else is meant: `Time h`, `Temperature K`.
+fn is_letter_unit(name: &str, unit: &str) -> bool {
+    let letters = match by_name(name.trim(), |_| true) {
+        Some((Role::Time, _)) if name.trim() != "T" => "hs",
+        Some((Role::Temperature, _)) => "kcf",
+        _ => "",
+    };
+    letters.contains(&unit.to_lowercase())
 }
 
 /// Units that are also words of names: `R_min`, `strain_in`. So is every letter.

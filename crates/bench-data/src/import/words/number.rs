@@ -145,7 +145,8 @@ fn ungrouped(whole: &str, mark: DecimalMark) -> Option<String> {
     let mut parts = whole.split(group);
     let first = parts.next()?;
     let is_digits = |part: &str| part.bytes().all(|byte| byte.is_ascii_digit());
-    if first.is_empty() || first.len() > 3 || !is_digits(first) {
+    // A group of thousands never begins with a zero: `0,950` has another decimal mark.
+    if first.is_empty() || first.len() > 3 || first.starts_with('0') || !is_digits(first) {
         return None;
     }
     parts.try_fold(first.to_owned(), |whole, part| (part.len() == 3 && is_digits(part)).then(|| whole + part))
@@ -173,7 +174,7 @@ mod tests {
         assert_eq!(number("1 600.25", DecimalMark::Point, 0), Some(1600.25));
         assert_eq!(number("5.", DecimalMark::Point, 3), Some(5000.0));
         assert_eq!(number("\u{2212}2.5", DecimalMark::Point, 0), Some(-2.5));
-        for text in ["1,60", "1;2", "12:30", "1.2.3", "abc", "", "-", "e5"] {
+        for text in ["1,60", "0,950", "1;2", "12:30", "1.2.3", "abc", "", "-", "e5"] {
             assert_eq!(number(text, DecimalMark::Point, 0), None, "{text}");
         }
     }

@@ -42,6 +42,8 @@ pub const RATE: Allowed = Allowed { least: 1e-12, most: 1e8 };
 pub const SPREAD: Allowed = Allowed { least: 1e-12, most: 1e6 };
 /// Standard deviations that may be zero.
 pub const AMOUNT: Allowed = Allowed { least: 0.0, most: 1e6 };
+/// Times, rates and steps that may be zero.
+pub const ZERO_OR_POSITIVE: Allowed = Allowed { least: 0.0, most: POSITIVE.most };
 /// Probabilities and powers.
 pub const SHARE: Allowed = Allowed { least: 0.0, most: 1.0 };
 /// Factors on standard deviations; calibration yields 1 to 5.
