@@ -80,7 +80,10 @@ pub enum StoredError {
         found: String,
     },
     /// State of another sensor.
-    #[error("the state belongs to another sensor: give the sensor.toml with which it was saved, or begin anew")]
+    #[error(
+        "the state belongs to another sensor or joint, or to readings with or without temperatures: give the sensor.toml, joint \
+         and columns with which it was saved, or begin anew"
+    )]
     Sensor,
     /// State of a filter with other options.
     #[error(
@@ -275,6 +278,19 @@ impl Stored {
     /// ```
     pub fn to_toml(&self) -> Result<String, Error> {
         Ok(toml::to_string(self)?)
+    }
+
+    /// True if the filter has taken a row.
+    ///
+    /// ```
+    /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
+    /// # let sensor = ohmstrain::Sensor::from_toml(&text)?;
+    /// assert!(!sensor.filter().build()?.store()?.is_begun());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub const fn is_begun(&self) -> bool {
+        self.last.is_some() || self.last_s.is_some()
     }
 
     /// Checks that a filter of these parts can resume from it.

@@ -58,6 +58,13 @@ impl Choices {
     }
 }
 
+/// Refuses choices of which one is not known, before there is a recording.
+#[pyfunction]
+pub fn check_choices(choices: Choices) -> PyResult<()> {
+    let prior = choices.prior()?;
+    choices.calibration(prior.as_ref()).map(|_| ())
+}
+
 /// Calibrates a sensor on recordings with a reference; returns it with the warnings.
 #[pyfunction]
 pub fn calibrate(py: Python, tables: Vec<(PyTable, About)>, choices: Choices) -> PyResult<(Sensor, Vec<String>)> {

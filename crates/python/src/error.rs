@@ -27,7 +27,8 @@ pub fn raise(place: &Place, message: &str) -> PyErr {
     let parts = [
         file.map(str::to_owned),
         row.map(|row| format!("row {row}")),
-        column.map(|column| format!("column `{column}`")),
+        // Some messages begin with it.
+        column.map(|column| format!("column `{column}`")).filter(|named| !message.starts_with(named)),
         Some(message.to_owned()),
     ];
     let text = parts.into_iter().flatten().collect::<Vec<_>>().join(": ");

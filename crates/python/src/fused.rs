@@ -66,6 +66,7 @@ fn estimated(fused: &Fused, recordings: &[Recording], rest: &[Option<f64>], smoo
     let refused = |error: ohmstrain::Error| of_library(&error, None);
     let mut sensors = Vec::new();
     for (sensor, recording) in fused.sensors().iter().zip(recordings) {
+        recording.check_kind(sensor)?;
         recording.check_unit(sensor, None)?;
         let sensor = sensor.clone();
         sensors.push(match recording.joint {

@@ -24,7 +24,7 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _core {
     #[pymodule_export]
-    use super::calibration::{calibrate, check_prior, evaluate_split, fit_prior};
+    use super::calibration::{calibrate, check_choices, check_prior, evaluate_split, fit_prior};
     #[pymodule_export]
     use super::error::OhmstrainError;
     #[pymodule_export]
@@ -40,6 +40,11 @@ mod _core {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        let error = module.py().get_type::<OhmstrainError>();
+        // Of errors that Python raises.
+        for place in ["file", "row", "column"] {
+            error.setattr(place, module.py().None())?;
+        }
         module.add("MADE_BY", ohmstrain::MADE_BY)
     }
 }

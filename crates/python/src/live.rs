@@ -7,8 +7,9 @@ use pyo3::types::PyDict;
 use pyo3_arrow::PyTable;
 
 use crate::about::About;
-use crate::error::of_library;
+use crate::error::{Place, of_library, raise};
 use crate::recording::Recording;
+use crate::sensor::on_joint;
 use crate::table::Estimates;
 use crate::watch::{Doubtful, Watch};
 
@@ -19,9 +20,6 @@ pub struct LiveFilter {
     sensor: ohmstrain::Sensor,
     columns: Vec<Column>,
     known: Vec<Known>,
-    /// Time of 0 s in the state that it resumes from, ns since 1970.
-    #[pyo3(get)]
-    zero_ns: Option<i64>,
 }
 
 struct Running {
@@ -30,6 +28,10 @@ struct Running {
     watch: Watch,
     /// Reading of the rested sensor, if it differs from that in calibration.
     rest_resistance: Option<f64>,
+    /// True after the first reading, whose unit was that of the calibration.
+    is_begun: bool,
+    /// Time of 0 s in tables with dates and times, ns since 1970.
+    zero_ns: Option<i64>,
 }
 
 /// A running fixed-lag filter.
@@ -49,9 +51,10 @@ fn refused(error: Error) -> PyErr {
     of_library(&error, None)
 }
 
-/// Converts a reading to the reference temperature.
-fn at_reference(thermometer: &mut Thermometer, reading: Option<f64>, temperature_c: Option<f64>) -> Option<f64> {
-    reading.map(|reading| thermometer.at_reference(reading, temperature_c.unwrap_or(f64::NAN)))
+/// Converts a reading to the reference temperature; returns the thermometer after it, too, since a refused row changes nothing.
+fn at_reference(mut thermometer: Thermometer, reading: Option<f64>, temperature_c: Option<f64>) -> (Thermometer, f64) {
+    let reading = thermometer.at_reference(reading.unwrap_or(f64::NAN), temperature_c.unwrap_or(f64::NAN));
+    (thermometer, reading)
 }
 
 /// Converts a row to a dictionary with the names of the columns; `None` for unknown values.
@@ -77,7 +80,9 @@ impl LiveFilter {
         known: Vec<Known>,
     ) -> Self {
         let watch = Watch::new(&sensor, rest_resistance, &known);
-        Self::watched(filter, watch, sensor, columns, rest_resistance, known)
+        let thermometer = Thermometer::new(&sensor);
+        let running = Running { filter, thermometer, watch, rest_resistance, is_begun: false, zero_ns: None };
+        Self { running: Mutex::new(running), sensor, columns, known }
     }
 
     /// Creates a filter that resumes from a state.
@@ -90,23 +95,24 @@ impl LiveFilter {
         stored: Stored,
     ) -> Self {
         let rest_resistance = given.or(stored.rest_resistance);
-        let (mut watch, zero_ns) = (Watch::new(&sensor, rest_resistance, &known), stored.zero_ns);
+        let (zero_ns, is_begun) = (stored.zero_ns, stored.is_begun());
+        let thermometer = Thermometer::new(&sensor).after(stored.temperature_c);
+        let mut watch = Watch::new(&sensor, rest_resistance, &known);
         if given.is_none() {
             watch.go_on(stored);
         }
-        Self { zero_ns, ..Self::watched(filter, watch, sensor, columns, rest_resistance, known) }
+        let running = Running { filter, thermometer, watch, rest_resistance, is_begun, zero_ns };
+        Self { running: Mutex::new(running), sensor, columns, known }
     }
 
-    fn watched(
-        filter: ohmstrain::Filter,
-        watch: Watch,
-        sensor: ohmstrain::Sensor,
-        columns: Vec<Column>,
-        rest_resistance: Option<f64>,
-        known: Vec<Known>,
-    ) -> Self {
-        let running = Mutex::new(Running { filter, thermometer: Thermometer::new(&sensor), watch, rest_resistance });
-        Self { running, sensor, columns, known, zero_ns: None }
+    /// Refuses a recording on another joint than the filter's.
+    fn check_joint(&self, recording: &Recording) -> PyResult<()> {
+        let sensor = on_joint(self.sensor.clone(), recording.joint, recording.name.as_deref())?;
+        if sensor.params().joint == self.sensor.params().joint {
+            return Ok(());
+        }
+        let place = Place { file: recording.name.as_deref(), ..Place::default() };
+        Err(raise(&place, "joint: expected that of the filter; create one on this joint with sensor.filter(joint=…)"))
     }
 }
 
@@ -116,8 +122,13 @@ pub fn stored(text: &str, file: Option<&str>) -> PyResult<Stored> {
 }
 
 impl LaggedFilter {
-    pub(crate) fn new(filter: ohmstrain::LaggedFilter, sensor: &ohmstrain::Sensor, columns: Vec<Column>) -> Self {
-        Self { filter: Mutex::new((filter, Thermometer::new(sensor))), columns }
+    pub(crate) fn new(
+        filter: ohmstrain::LaggedFilter,
+        sensor: &ohmstrain::Sensor,
+        columns: Vec<Column>,
+        last_c: Option<f64>,
+    ) -> Self {
+        Self { filter: Mutex::new((filter, Thermometer::new(sensor).after(last_c))), columns }
     }
 }
 
@@ -132,21 +143,34 @@ impl LiveFilter {
         temperature_c: Option<f64>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let mut running = locked(&self.running, py);
-        let Running { filter, thermometer, .. } = &mut *running;
-        let estimate = filter.step(time_s, at_reference(thermometer, reading, temperature_c)).map_err(refused)?;
+        let (thermometer, reading) = at_reference(running.thermometer, reading, temperature_c);
+        let estimate = running.filter.step(time_s, reading).map_err(refused)?;
+        running.thermometer = thermometer;
+        running.is_begun |= reading.is_finite();
         row(py, &self.columns, &estimate)
     }
 
-    /// Takes the rows of a table; the next call continues after the last one.
-    fn run(&self, py: Python, table: PyTable, about: About) -> PyResult<Doubtful> {
+    /// Takes the rows of a table, whose 0 s is at `zero_ns`; the next call continues after the last one.
+    #[pyo3(signature = (table, about, zero_ns=None))]
+    fn run(&self, py: Python, table: PyTable, about: About, zero_ns: Option<i64>) -> PyResult<Doubtful> {
         let mut recording = Recording::new(table, about)?;
-        recording.convert_for(&self.sensor);
+        self.check_joint(&recording)?;
         let mut running = locked(&self.running, py);
-        let Running { filter, watch, rest_resistance, .. } = &mut *running;
-        recording.check_unit(&self.sensor, *rest_resistance)?;
+        let Running { filter, thermometer, watch, rest_resistance, is_begun, zero_ns: running_zero_ns } = &mut *running;
+        recording.convert(*thermometer);
+        recording.check_kind(&self.sensor)?;
+        if !*is_begun {
+            recording.check_unit(&self.sensor, *rest_resistance)?;
+            let blind = recording.without_temperatures(&self.sensor, *thermometer);
+            watch.warnings.extend(blind);
+        }
         let mut estimates = Estimates::new(self.columns.clone(), recording.time_s.len());
         py.detach(|| {
             recording.filtered(filter, |row, estimate| {
+                // Rows that are refused change neither.
+                let _ = thermometer.at_reference(f64::NAN, recording.temperature_c(row));
+                *running_zero_ns = running_zero_ns.or(zero_ns);
+                *is_begun |= recording.readings[row].is_finite();
                 estimates.put(row, std::slice::from_ref(estimate));
                 watch.see(&recording, row, estimate.strain_rate);
                 watch.see_rest(&recording, estimate);
@@ -155,13 +179,18 @@ impl LiveFilter {
         Ok((estimates.into_batch()?, std::mem::take(&mut watch.warnings)))
     }
 
+    #[getter]
+    fn zero_ns(&self, py: Python) -> Option<i64> {
+        locked(&self.running, py).zero_ns
+    }
+
     /// Stores everything that the next row depends on, as TOML, with the time of 0 s.
-    #[pyo3(signature = (zero_ns=None))]
-    fn store(&self, py: Python, zero_ns: Option<i64>) -> PyResult<String> {
+    fn store(&self, py: Python) -> PyResult<String> {
         let running = locked(&self.running, py);
         let mut stored = running.filter.store().map_err(refused)?;
-        stored.zero_ns = zero_ns;
+        stored.zero_ns = running.zero_ns;
         stored.rest_resistance = running.rest_resistance;
+        stored.temperature_c = running.thermometer.last_c();
         running.watch.store(&mut stored);
         stored.to_toml().map_err(refused)
     }
@@ -187,7 +216,9 @@ impl LaggedFilter {
     ) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let mut guard = locked(&self.filter, py);
         let (filter, thermometer) = &mut *guard;
-        let rows = filter.step(time_s, at_reference(thermometer, reading, temperature_c)).map_err(refused)?;
+        let (after, reading) = at_reference(*thermometer, reading, temperature_c);
+        let rows = filter.step(time_s, reading).map_err(refused)?;
+        *thermometer = after;
         rows.iter().map(|estimate| row(py, &self.columns, estimate)).collect()
     }
 
@@ -199,7 +230,10 @@ impl LaggedFilter {
 
     /// Stores everything that the next row depends on, as TOML.
     fn store(&self, py: Python) -> PyResult<String> {
-        locked(&self.filter, py).0.store().and_then(|stored| stored.to_toml()).map_err(refused)
+        let guard = locked(&self.filter, py);
+        let mut stored = guard.0.store().map_err(refused)?;
+        stored.temperature_c = guard.1.last_c();
+        stored.to_toml().map_err(refused)
     }
 
     fn rest_resistance(&self, py: Python, measured: f64) -> PyResult<()> {

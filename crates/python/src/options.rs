@@ -48,12 +48,16 @@ impl Options {
     pub fn columns(&self, sensor: &Sensor) -> PyResult<Vec<Column>> {
         let known = sensor.columns();
         let Some(chosen) = &self.columns else { return Ok(known) };
+        let wrong = |found: &str| {
+            let names: Vec<&str> = known.iter().map(Column::name).collect();
+            raise(&Place::default(), &format!("columns: expected some of {}, found {found}", names.join(",")))
+        };
+        if chosen.is_empty() {
+            return Err(wrong("none"));
+        }
         let column = |name: &String| {
-            known.iter().copied().find(|column| column.name() == name).ok_or_else(|| {
-                let names: Vec<&str> = known.iter().map(Column::name).collect();
-                let message = format!("columns: expected some of {}, found `{name}`", names.join(","));
-                raise(&Place::default(), &message)
-            })
+            let found = known.iter().copied().find(|column| column.name() == name);
+            found.ok_or_else(|| wrong(&format!("`{name}`")))
         };
         chosen.iter().map(column).collect()
     }
@@ -65,6 +69,7 @@ impl Options {
 
     /// Returns the builder of a sensor's filter with these options.
     pub fn builder<'a>(&'a self, sensor: &'a Sensor) -> PyResult<FilterBuilder<'a>> {
+        self.known.iter().try_for_each(check_known)?;
         let mut builder = sensor.filter().known(&self.known);
         if let Some(kind) = self.estimator.as_deref().map(estimator).transpose()?.flatten() {
             builder = builder.estimator(kind);
@@ -92,6 +97,17 @@ impl Options {
 fn known(given: &Bound<PyAny>) -> PyResult<Vec<Known>> {
     let strains: Vec<(f64, f64, Option<f64>)> = given.extract()?;
     Ok(strains.into_iter().map(|(time_s, strain, sd)| Known { time_s, strain, sd }).collect())
+}
+
+/// Refuses a known strain that is not finite.
+fn check_known(known: &Known) -> PyResult<()> {
+    let Known { time_s, strain, sd } = known;
+    if time_s.is_finite() && strain.is_finite() && sd.is_none_or(|sd| sd.is_finite() && sd > 0.0) {
+        return Ok(());
+    }
+    let sd = sd.map_or_else(String::new, |sd| format!(", {sd}"));
+    let expected = "expected (time_s, strain) or (time_s, strain, sd), finite numbers and a positive sd";
+    Err(raise(&Place::default(), &format!("known: {expected}, found ({time_s}, {strain}{sd})")))
 }
 
 /// Returns an estimator by its name; `None` for `auto`.

@@ -8,7 +8,9 @@ use arrow_array::types::Float64Type;
 use arrow_array::{Array, RecordBatch};
 use arrow_cast::cast;
 use arrow_schema::{ArrowError, DataType, Schema};
-use ohmstrain::{Error, Estimate, Filter, FilterBuilder, JointParams, Quantity, Reading, ReadingUnit, Sensor};
+use ohmstrain::{
+    Error, Estimate, Filter, FilterBuilder, JointParams, Quantity, Reading, ReadingUnit, Sensor, Thermometer,
+};
 use ohmstrain_calib::Samples;
 use pyo3::prelude::*;
 use pyo3_arrow::PyTable;
@@ -44,6 +46,9 @@ pub struct Recording {
 /// Number of rows between checks for an interrupt.
 const ROWS_PER_CHECK: usize = 4096;
 
+/// Key of a schema's metadata with the names of all columns of the user's table, of which it has some.
+const NAMES: &str = "ohmstrain_columns";
+
 /// Groups of columns: a table has exactly one of each of the first two groups, and at most one of the others.
 const TIMES: [&str; 2] = ["time_s", "time_us"];
 const READINGS: [&str; 3] = ["resistance_ohm", "resistance_ratio", "adc"];
@@ -59,8 +64,9 @@ impl Recording {
         let needed = |group: &[&'static str]| {
             one_of(&schema, group, file)?.ok_or_else(|| {
                 let names: Vec<&str> = schema.fields().iter().map(|field| field.name().as_str()).collect();
+                let names = schema.metadata().get(NAMES).cloned().unwrap_or_else(|| names.join(","));
                 let expected = group.join("` or `");
-                let text = format!("expected a column `{expected}`, found `{}`", names.join(","));
+                let text = format!("expected a column `{expected}`, found `{names}`");
                 raise(&Place { file, ..Place::default() }, &text)
             })
         };
@@ -120,9 +126,30 @@ impl Recording {
     /// Converts its readings to the reference temperature of a sensor; returns the sensor for it, with wider intervals if it has no
     /// temperatures.
     pub fn convert_for(&mut self, sensor: &Sensor) -> Sensor {
-        let Some(temperature_c) = &self.temperature_c else { return sensor.clone().without_temperature() };
-        self.readings = sensor.at_reference_temperature(&self.readings, temperature_c);
-        sensor.clone()
+        let sensor = sensor.clone();
+        let sensor = if self.temperature_c.is_some() { sensor } else { sensor.without_temperature() };
+        self.convert(Thermometer::new(&sensor));
+        sensor
+    }
+
+    /// Converts its readings to a thermometer's reference temperature.
+    pub fn convert(&mut self, mut thermometer: Thermometer) {
+        for row in 0..self.readings.len() {
+            self.readings[row] = thermometer.at_reference(self.readings[row], self.temperature_c(row));
+        }
+    }
+
+    /// Returns a warning that a sensor's filter has had no temperature, though its intervals take one for granted.
+    pub fn without_temperatures(&self, sensor: &Sensor, thermometer: Thermometer) -> Option<String> {
+        let is_blind = self.temperature_c.is_none() && thermometer.last_c().is_none();
+        let text =
+            "no column `temperature_c`: intervals are too narrow; use the filter of sensor.without_temperature()";
+        (is_blind && sensor.params().temperature.is_some()).then(|| format!("{}{text}", self.before()))
+    }
+
+    /// Returns the temperature of a row, °C; NaN if it was not measured.
+    pub fn temperature_c(&self, row: usize) -> f64 {
+        self.temperature_c.as_ref().map_or(f64::NAN, |temperature_c| temperature_c[row])
     }
 
     /// Returns samples of it in the form that the library calibrates on.
@@ -189,12 +216,17 @@ impl Recording {
         of_library(error, self.name.as_deref())
     }
 
-    /// Refuses readings in another unit than the sensor's, or that seem to be.
-    pub fn check_unit(&self, sensor: &Sensor, rest_resistance: Option<f64>) -> PyResult<()> {
-        let place = Place { file: self.name.as_deref(), ..Place::default() };
-        if self.unit != sensor.params().reading {
-            return Err(raise(&place, "expected readings in the unit of the sensor's calibration, ohms or ratios"));
+    /// Refuses ratios for a sensor that reads ohms, and the reverse.
+    pub fn check_kind(&self, sensor: &Sensor) -> PyResult<()> {
+        if self.unit == sensor.params().reading {
+            return Ok(());
         }
+        let place = Place { file: self.name.as_deref(), ..Place::default() };
+        Err(raise(&place, "expected readings in the unit of the sensor's calibration, ohms or ratios"))
+    }
+
+    /// Refuses readings that seem to be in another unit than the sensor's.
+    pub fn check_unit(&self, sensor: &Sensor, rest_resistance: Option<f64>) -> PyResult<()> {
         let checked = sensor.check_unit(self.readings.iter().copied(), rest_resistance);
         checked.map_err(|doubt| self.refused(&doubt.into()))
     }
@@ -202,8 +234,8 @@ impl Recording {
 
 /// Returns the only column of a group in a table.
 fn one_of(schema: &Schema, group: &[&'static str], file: Option<&str>) -> PyResult<Option<&'static str>> {
-    let found: Vec<&'static str> =
-        group.iter().copied().filter(|name| schema.fields().iter().any(|field| field.name() == name)).collect();
+    let names = schema.fields().iter().map(|field| field.name());
+    let found: Vec<&'static str> = names.filter_map(|name| group.iter().copied().find(|known| known == name)).collect();
     match found[..] {
         [] => Ok(None),
         [one] => Ok(Some(one)),

@@ -24,12 +24,18 @@ impl Sensor {
     /// has one.
     fn for_recording(&self, recording: &mut Recording, options: &Options) -> PyResult<ohmstrain::Sensor> {
         let sensor = recording.convert_for(&self.sensor);
+        recording.check_kind(&sensor)?;
         recording.check_unit(&sensor, options.rest_resistance(&sensor)?)?;
         on_joint(sensor, recording.joint, recording.name.as_deref())
     }
 }
 
-fn on_joint(sensor: ohmstrain::Sensor, joint: Option<JointParams>, file: Option<&str>) -> PyResult<ohmstrain::Sensor> {
+/// Returns the sensor on its joint, if it has one.
+pub fn on_joint(
+    sensor: ohmstrain::Sensor,
+    joint: Option<JointParams>,
+    file: Option<&str>,
+) -> PyResult<ohmstrain::Sensor> {
     match joint {
         None => Ok(sensor),
         Some(joint) => sensor.on_joint(joint).map_err(|error| of_library(&error, file)),
@@ -41,6 +47,12 @@ impl Sensor {
     /// Returns the sensor for readings whose temperature is not measured.
     fn without_temperature(&self) -> Self {
         Self { sensor: self.sensor.clone().without_temperature() }
+    }
+
+    /// Returns the sensor on a joint.
+    fn on_joint(&self, joint: String) -> PyResult<Self> {
+        let joint = About { joint: Some(joint), ..About::default() }.joint()?;
+        Ok(Self { sensor: on_joint(self.sensor.clone(), joint, None)? })
     }
 
     #[staticmethod]
@@ -108,7 +120,7 @@ impl Sensor {
 
     fn lagged(&self, options: Options, lag_s: f64) -> PyResult<LaggedFilter> {
         let filter = options.builder(&self.sensor)?.build_lagged(lag_s).map_err(|error| of_library(&error, None))?;
-        Ok(LaggedFilter::new(filter, &self.sensor, options.columns(&self.sensor)?))
+        Ok(LaggedFilter::new(filter, &self.sensor, options.columns(&self.sensor)?, None))
     }
 
     /// Resumes a filter from a state.
@@ -123,9 +135,10 @@ impl Sensor {
     /// Resumes a filter with a lag.
     #[pyo3(signature = (options, lag_s, state, file=None))]
     fn resume_lagged(&self, options: Options, lag_s: f64, state: &str, file: Option<&str>) -> PyResult<LaggedFilter> {
-        let filter = options.builder(&self.sensor)?.resume_lagged(lag_s, &stored(state, file)?);
+        let stored = stored(state, file)?;
+        let filter = options.builder(&self.sensor)?.resume_lagged(lag_s, &stored);
         let filter = filter.map_err(|error| of_library(&error, file))?;
-        Ok(LaggedFilter::new(filter, &self.sensor, options.columns(&self.sensor)?))
+        Ok(LaggedFilter::new(filter, &self.sensor, options.columns(&self.sensor)?, stored.temperature_c))
     }
 
     fn filter(&self, py: Python, table: PyTable, about: About, options: Options) -> PyResult<Doubtful> {

@@ -99,6 +99,8 @@ def test_evaluate(folder, trace, sensor):
     [evaluation] = oh.evaluate(trace, splits=[0.5], estimator="ekf")
     compare(evaluation, printed["recordings"][0])
     assert set(evaluation) >= {"fir_20s", "low_pass_mode", "leaky_bank"}
+    with pytest.raises(TypeError, match="split"):
+        oh.evaluate(trace, split=[0.3], estimator="ekf")
 
 
 def compare(evaluation, printed):

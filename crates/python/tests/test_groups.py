@@ -122,6 +122,9 @@ def test_what_cannot_work_is_refused_before(trace, sensor):
         Work("smooth", BY, {})
     with pytest.raises(oh.OhmstrainError, match="estimator"):
         Work("smooth", BY, sensor, estimator="kalman")
+    for choice, value in (("estimator", "kalman"), ("gauge", "linear"), ("branches", 9)):
+        with pytest.raises(oh.OhmstrainError, match=choice):
+            Work("calibrate", BY, **{choice: value})
     with pytest.raises(oh.OhmstrainError, match="columns"):
         Work("smooth", BY, sensor, columns=["strian"])
     rows = trace.head(50).assign(sensor_id="unknown", recording_id=1)

@@ -35,6 +35,16 @@ def test_a_loaded_sensor_prints_the_same(tmp_path, trace):
     assert len(figures[1].axes) == 3 and shown[0] == shown[1]
 
 
+def test_a_file_that_cannot_be_written(tmp_path, sensor):
+    (tmp_path / "folder").mkdir()
+    for works in (sensor.save, sensor.filter().save, oh.Prior.fit([sensor] * 3).save):
+        for name, error in (("folder", IsADirectoryError), ("none/sensor.toml", FileNotFoundError)):
+            with pytest.raises(error) as raised:
+                works(tmp_path / name)
+            assert raised.value.filename == str(tmp_path / name) and raised.value.filename2 is None
+    assert [path.name for path in tmp_path.iterdir()] == ["folder"]
+
+
 def test_a_bad_file_is_named(tmp_path, folder):
     path = tmp_path / "bad.toml"
     path.write_text((folder / "sensor.toml").read_text().replace("rest_reading = ", "rest_reading = -", 1))
@@ -66,6 +76,11 @@ def test_wrong_options_are_named(sensor):
         sensor.filter(influence="huber")
     with pytest.raises(oh.OhmstrainError, match="columns: expected some of time_s,.*found `strian`"):
         sensor.filter(columns=["strian"])
+    with pytest.raises(oh.OhmstrainError, match="columns: expected some of time_s,.*found none"):
+        sensor.filter(columns=[])
+    for known in ((float("nan"), 0.1), (1.0, float("inf")), (1.0, 0.1, 0.0)):
+        with pytest.raises(oh.OhmstrainError, match=r"known: expected \(time_s, strain\) or .*, found \("):
+            sensor.filter(known=[known])
     with pytest.raises(oh.OhmstrainError, match="initial strain"):
         sensor.filter(initial_strain=10.0)
     with pytest.raises(TypeError):
@@ -154,6 +169,15 @@ def test_plots(trace, sensor):
     lines = [oh.plot.strain(estimates, moved, gauge_length_mm=length).axes[0].lines for length in (None, 30)]
     assert [len(each) for each in lines] == [1, 2]
     np.testing.assert_allclose(lines[1][1].get_ydata(), 100 * trace["strain"].head(300))
+    first = trace.head(300)
+    micro = first.drop(columns="time_s").assign(time_us=1e6 * first["time_s"])
+    percent = first.assign(strain=100 * first["strain"])
+    for table, unit in ((micro, None), (percent, "percent")):
+        reference = oh.plot.strain(estimates, table, strain_unit=unit).axes[0].lines[1]
+        np.testing.assert_allclose(reference.get_xdata(), first["time_s"])
+        np.testing.assert_allclose(reference.get_ydata(), 100 * first["strain"])
+    with pytest.raises(oh.OhmstrainError, match='in percent\\? Then say so with strain_unit="percent"'):
+        oh.plot.strain(estimates, percent)
     # A file of an older version says less.
     summary = sensor.to_toml().split("\n[findings")[0]
     assert len(oh.Sensor.from_toml(summary).plot.calibration().axes) == 1

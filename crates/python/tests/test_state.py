@@ -140,3 +140,41 @@ def test_the_command_line_goes_on_from_python_and_back(sensor, rows, folder, tmp
     run(folder, "filter", "a.csv", "--sensor", "sensor.toml", "--save-state", "line.toml", "-o", "a_estimates.csv")
     live = sensor.filter(resume=folder / "line.toml")
     assert [row["strain"] for row in steps(live, rows[150:])] == whole[150:]
+
+
+def test_a_filter_on_a_joint(sensor, rows, tmp_path):
+    joint = "prestrain=0.05 moment_arm_mm=4.4 gauge_length_mm=30"
+    whole, live = sensor.filter(rows, joint=joint), sensor.filter(joint=joint)
+    with pytest.raises(oh.OhmstrainError, match=r"joint: expected that of the filter; .*sensor.filter\(joint=…\)"):
+        sensor.filter().run(rows, joint=joint)
+    first = live.run(rows[:100], joint=joint)
+    live.save(tmp_path / "state.toml")
+    expected = live.run(rows[100:])
+    pd.testing.assert_frame_equal(pd.concat([first, expected]), whole)
+    with pytest.raises(oh.OhmstrainError, match="another sensor or joint"):
+        sensor.filter(resume=tmp_path / "state.toml")
+    for other in (pickle.loads(pickle.dumps(live)), sensor.filter(resume=tmp_path / "state.toml", joint=joint)):
+        assert "angle_deg" in other.step(100.0, 1700.0)
+    assert sensor.filter(resume=tmp_path / "state.toml", joint=joint).run(rows[100:]).equals(expected)
+
+
+def test_a_piece_may_be_a_fault(sensor, rows):
+    faulty = rows.assign(resistance_ohm=rows["resistance_ohm"].where((rows.index < 100) | (rows.index > 199), 1.5))
+    whole, live = sensor.filter(faulty), sensor.filter()
+    pd.testing.assert_frame_equal(pd.concat([live.run(faulty[:100]), live.run(faulty[100:200]), live.run(faulty[200:])]), whole)
+    live = sensor.filter()
+    live.step(*faulty.iloc[0])
+    live.run(faulty[100:200])
+    with pytest.raises(oh.OhmstrainError, match="kilo-ohms"):
+        pickle.loads(pickle.dumps(sensor.filter())).run(faulty[100:200])
+    with pytest.raises(oh.OhmstrainError, match="ohms or ratios"):
+        live.run(faulty[200:].rename(columns={"resistance_ohm": "resistance_ratio"}))
+
+
+def test_a_refused_piece_sets_no_zero(sensor, rows):
+    moments = rows.assign(time_s=pd.Timestamp("2025-10-31 18:35:45") + pd.to_timedelta(rows["time_s"], unit="s"))
+    live = sensor.filter()
+    with pytest.raises(oh.OhmstrainError, match="kilo-ohms"):
+        live.run(moments.assign(resistance_ohm=rows["resistance_ohm"] / 1000))
+    assert live.run(moments[100:200])["time_s"].iloc[0] == 0.0
+    assert live.run(moments[200:])["time_s"].iloc[0] == pytest.approx(rows["time_s"][200] - rows["time_s"][100])

@@ -59,9 +59,35 @@ def test_errors_name_the_place(trace, sensor, change, row, column, text):
         sensor.smooth(change(trace.head(100)), name="knee 3")
     assert (raised.value.file, raised.value.row, raised.value.column) == ("knee 3", row, column)
     assert str(raised.value).startswith("knee 3: ")
+    assert str(raised.value).count("column") <= 1 + (row is None and "resistance_ratio" in text)
     for no_table in ([1, 2, 3], trace["resistance_ohm"]):
         with pytest.raises(TypeError, match="expected a table"):
             sensor.smooth(no_table)
+
+
+def test_the_users_columns_are_named(trace, sensor):
+    first = trace.head(50)[["time_s", "resistance_ohm"]].rename(columns={"time_s": "t"}).assign(other=1.0)
+    for table in (first, first.to_dict("list"), pa.Table.from_pandas(first, preserve_index=False), pl.from_pandas(first)):
+        with pytest.raises(oh.OhmstrainError, match="expected a column `time_s` or `time_us`, found `t,resistance_ohm,other`"):
+            sensor.filter(table)
+
+
+def test_a_column_that_exists_twice(trace, sensor):
+    time_s, ohm = trace["time_s"].head(50), trace["resistance_ohm"].head(50)
+    for names in (["time_s", "resistance_ohm", "resistance_ohm"], ["time_s", "resistance_ohm", "resistance_ohm", "other"]):
+        table = pa.table([time_s, ohm, 2 * ohm, ohm][: len(names)], names=names)
+        with pytest.raises(oh.OhmstrainError, match="found `resistance_ohm` and `resistance_ohm`"):
+            sensor.filter(table)
+
+
+def test_errors_of_python_have_a_place(trace, sensor):
+    with pytest.raises(oh.OhmstrainError) as raised:
+        oh.Hand.load(__file__)
+    assert (raised.value.file, raised.value.row, raised.value.column) == (__file__, None, None)
+    stamps = np.arange(2).astype("datetime64[s]")
+    with pytest.raises(oh.OhmstrainError, match="one column of times") as raised:
+        sensor.filter({"a": stamps, "b": stamps, "resistance_ohm": [1600.0, 1601.0]})
+    assert (raised.value.file, raised.value.row, raised.value.column) == (None, None, None)
 
 
 def test_a_reference_is_needed_where_it_is(trace):

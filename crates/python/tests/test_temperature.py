@@ -1,5 +1,8 @@
 """Recordings and live readings with temperatures, as the command line has them."""
 
+import pickle
+import warnings
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -50,3 +53,79 @@ def test_without_temperatures_intervals_are_those_of_the_sensor_without(chamber)
     # The same readings, known to be at the reference temperature.
     still = blind.assign(temperature_c=sensor.params["temperature"]["reference_c"])
     assert sensor.filter(blind)["strain_sd"].mean() > sensor.filter(still)["strain_sd"].mean()
+
+
+NAMES = ["time_s", "resistance_ohm", "temperature_c"]
+
+
+@pytest.fixture(scope="module")
+def gappy(chamber):
+    """Rows whose thermometer reads something implausible, and is silent for long, at a temperature far from the reference."""
+    rows = read(chamber / "trace.csv").head(600)[NAMES]
+    far = next(k for k in range(60, 500) if abs(rows["temperature_c"][k] - 25) > 12)
+    rows.loc[20:30, "temperature_c"] = -127.0
+    rows.loc[far : far + 60, "temperature_c"] = np.nan
+    rows.loc[far - 1, "resistance_ohm"] = np.nan
+    return rows, far
+
+
+def test_pieces_and_steps_are_the_whole_when_temperatures_are_missing(chamber, gappy):
+    sensor, (rows, far) = oh.Sensor.load(chamber / "sensor.toml"), gappy
+    rows.to_csv(chamber / "gappy.csv", index=False)
+    run(chamber, "filter", "gappy.csv", "--sensor", "sensor.toml", "-o", "estimates.csv", "--force")
+    program, live, other = read(chamber / "estimates.csv"), sensor.filter(), sensor.filter()
+    pieces = pd.concat([live.run(rows[:far]), live.run(rows[far:])])
+    steps = pd.DataFrame([other.step(*row) for row in rows.itertuples(index=False)])
+    for name in ("resistance_ohm", "strain", "strain_sd"):
+        assert np.array_equal(pieces[name], program[name], equal_nan=True), name
+        assert np.array_equal(steps[name].astype(float), program[name], equal_nan=True), name
+
+
+def test_a_state_has_the_last_temperature(chamber, gappy, tmp_path):
+    sensor, (rows, far) = oh.Sensor.load(chamber / "sensor.toml"), gappy
+
+    def due(live, rows):
+        found = [live.step(*row) for row in rows.itertuples(index=False)]
+        return found if isinstance(live, oh.LiveFilter) else sum(found, [])
+
+    for options in ({}, {"lag_s": 1.0}):
+        live = sensor.filter(**options)
+        due(live, rows[:far])
+        live.save(tmp_path / "state.toml")
+        others = [pickle.loads(pickle.dumps(live)), sensor.filter(resume=tmp_path / "state.toml", **options)]
+        expected = due(live, rows[far : far + 20])
+        assert all(due(other, rows[far : far + 20]) == expected for other in others), options
+    live = sensor.filter()
+    live.run(rows[:far])
+    live.save(chamber / "python.toml")
+    rows[far:].to_csv(chamber / "later.csv", index=False)
+    run(chamber, "filter", "later.csv", "--sensor", "sensor.toml", "--resume", "python.toml", "-o", "later_estimates.csv")
+    assert read(chamber / "later_estimates.csv")["strain"].to_list() == live.run(rows[far:])["strain"].to_list()
+
+
+def test_a_refused_row_changes_no_temperature(chamber):
+    sensor = oh.Sensor.load(chamber / "sensor.toml")
+    for options in ({}, {"lag_s": 0.5}):
+        live, other = sensor.filter(**options), sensor.filter(**options)
+        for each in (live, other):
+            each.step(0.0, 5000.0, 25.0)
+        with pytest.raises(oh.OhmstrainError):
+            live.step(-1.0, 5000.0, 38.0)
+        assert [live.step(time_s, 5000.0) for time_s in (1.0, 2.0)] == [other.step(time_s, 5000.0) for time_s in (1.0, 2.0)]
+
+
+def test_a_running_filter_without_temperatures_is_doubted(chamber):
+    sensor, rows = oh.Sensor.load(chamber / "sensor.toml"), read(chamber / "trace.csv").head(100)
+    blind = rows[["time_s", "resistance_ohm"]]
+    with pytest.warns(oh.OhmstrainWarning, match=r"no column `temperature_c`: .* sensor.without_temperature\(\)"):
+        sensor.filter().run(blind)
+    live, without = sensor.filter(), sensor.without_temperature().filter()
+    live.step(-1.0, None, 25.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", oh.OhmstrainWarning)
+        live.run(blind)
+        found = without.run(blind)
+    assert found.equals(sensor.filter(blind))
+    without.save(chamber / "blind.toml")
+    with pytest.raises(oh.OhmstrainError, match="readings with or without temperatures"):
+        sensor.filter(resume=chamber / "blind.toml")

@@ -38,7 +38,10 @@ def tables(recording):
         yield pl.from_pandas(rest).with_columns(pl.Series("time_s", moments))
         yield rest.assign(time_s=passed(unit))
         yield rest.set_index(pd.TimedeltaIndex(passed(unit)))
+        yield {"when": pa.array(moments), **rest.to_dict("list")}
+        yield {"when": pl.Series(moments), **rest.to_dict("list")}
     begin = datetime(2025, 3, 30, 0, 59, 50, tzinfo=timezone.utc)
+    yield {**rest.to_dict("list"), "when": [begin + timedelta(seconds=0.2 * k) for k in range(200)]}
     yield {**rest.to_dict("list"), "time_s": [begin + timedelta(seconds=0.2 * k) for k in range(200)]}
 
 

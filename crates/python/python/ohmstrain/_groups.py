@@ -39,7 +39,7 @@ class Work:
         self._made: dict[Any, Sensor] = {}
         # Invalid options raise an error here, instead of one in each of ten thousand groups.
         if task == "calibrate":
-            _choices(**self.options)
+            _core.check_choices(_choices(**self.options))
         else:
             given = [Sensor.from_toml(text) for text in self.texts.values()]
             columns = [sensor._core.columns(self.about, _options(**self.options)) for sensor in given]

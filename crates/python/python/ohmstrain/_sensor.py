@@ -93,11 +93,18 @@ def _split(arguments: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
 
 def _write(path: str | os.PathLike[str], text: str) -> None:
     """Write a file, whole or not at all."""
-    target = Path(path)
-    with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=target.parent, delete=False) as draft:
-        draft.write(text)
-    os.chmod(draft.name, 0o644)
-    os.replace(draft.name, target)
+    target, draft = Path(path), None
+    try:
+        with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=target.parent, delete=False) as draft:
+            draft.write(text)
+        os.chmod(draft.name, 0o644)
+        os.replace(draft.name, target)
+    except OSError as error:
+        # Names the file, and not the temporary one.
+        raise OSError(error.errno, error.strerror, os.fspath(path)) from None
+    finally:
+        if draft is not None:
+            Path(draft.name).unlink(missing_ok=True)
 
 
 class Prior:
@@ -235,9 +242,11 @@ class Sensor:
             ``none``, which uses them unchanged.
         columns : list of str
             Requested columns of the estimates, from :attr:`columns`; all by default.
-        name, gauge_length_mm, front_end, joint, strain_unit, resistance_unit
-            Name of the recording in messages, and the metadata above the header of a trace CSV; units are ``fraction`` or
-            ``percent`` and ``ohm`` or ``kohm``. A table of :func:`ohmstrain.read` contains them.
+        joint : str
+            Joint that the sensor is mounted on, as above the header of a trace CSV.
+        name, gauge_length_mm, front_end, strain_unit, resistance_unit
+            Name of the recording in messages, and the other metadata above the header of a trace CSV; units are ``fraction`` or
+            ``percent`` and ``ohm`` or ``kohm``. A table of :func:`ohmstrain.read` contains them. A live filter does not take them.
 
         Returns
         -------
@@ -252,6 +261,9 @@ class Sensor:
             if lag_s is not None or resume is not None:
                 raise TypeError("lag_s and resume are for live filters; smooth() estimates from all readings")
             return self._estimate(self._core.filter, recording, options)
+        if options.get("joint") is not None:
+            on_joint = Sensor(self._core.on_joint(options.pop("joint")), self._file)
+            return on_joint.filter(lag_s=lag_s, resume=resume, **options)
         if "columns" in options and options["columns"] is not None:
             options["columns"] = list(options["columns"])
         if resume is not None:
@@ -371,7 +383,6 @@ class LiveFilter:
     def __init__(self, core: _core.LiveFilter, sensor: Sensor, options: Mapping[str, Any]) -> None:
         self._core = core
         self._sensor, self._options = sensor, _of_later(options)
-        self._origin = _tables.Origin()
 
     def step(self, time_s: float, reading: float | None = None, temperature_c: float | None = None) -> dict[str, Any]:
         """Take the reading at a time, s, and the temperature, °C; a missing reading is None or NaN. An error leaves the filter as it
@@ -381,9 +392,10 @@ class LiveFilter:
 
     def run(self, rows: Any, **about: Any) -> Any:
         """Take the rows of a table, one piece of a recording; the next call continues after the last row. For dates and times, the
-        first row of the first piece is at 0 s.
+        first row of the first piece is at 0 s. ``about`` is that of :meth:`Sensor.filter`.
         """
-        table, doubts = self._core.run(_tables.to_arrow(rows, self._origin), _about(**about))
+        origin = _tables.Origin(self._core.zero_ns)
+        table, doubts = self._core.run(_tables.to_arrow(rows, origin), _about(**about), origin.first_ns)
         _warn(doubts)
         return _tables.converter(rows)(_tables.from_core(table))
 
@@ -393,7 +405,7 @@ class LiveFilter:
 
     def state(self) -> str:
         """Return everything that the next row depends on, as the text of a state file."""
-        return self._core.store(self._origin.first_ns)
+        return self._core.store()
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a state file, whole or not at all: for ``sensor.filter(resume=path)`` and ``ohmstrain filter --resume``."""
@@ -447,9 +459,7 @@ def _resumed(
     if lag_s is not None:
         core = sensor._core.resume_lagged(_options(**options), lag_s, state, file)
         return LaggedFilter(core, sensor, options, lag_s)
-    live = LiveFilter(sensor._core.resume(_options(**options), state, file), sensor, options)
-    live._origin.first_ns = live._core.zero_ns
-    return live
+    return LiveFilter(sensor._core.resume(_options(**options), state, file), sensor, options)
 
 
 def calibrate(
@@ -529,7 +539,7 @@ def evaluate(
     list of Evaluation
         One per split, with the scores of ``ohmstrain evaluate --splits``.
     """
-    about, _ = _split(dict(about))
+    about = _about(**about)
     table = _tables.to_arrow(recording)
     evaluations = []
     for share in splits:

@@ -33,7 +33,7 @@ def to_arrow(table: Any, origin: Origin | None = None) -> pa.Table:
     if isinstance(table, (pa.Table, pa.RecordBatch)):
         arrow = table
     elif isinstance(table, Mapping):
-        wanted = _wanted(list(table), lambda name: _is_time_kind(getattr(table[name], "dtype", None)))
+        wanted = _wanted(list(table), lambda name: _is_time_column(table[name]))
         arrow = pa.table({name: _array(table[name]) for name in wanted})
     elif _is_pandas(table):
         wanted = _wanted(list(table.columns), lambda name: _is_time_kind(table.dtypes[name]))
@@ -48,8 +48,11 @@ def to_arrow(table: Any, origin: Origin | None = None) -> pa.Table:
     else:
         raise refused
     known = _wanted(arrow.column_names, lambda name: _is_time(arrow.schema.field(name).type))
-    # Without a known column all names are passed on, for the message about missing ones.
-    return _in_seconds(arrow if known in ([], arrow.column_names) else arrow.select(known), origin or Origin())
+    places = [place for place, name in enumerate(arrow.column_names) if name in known]
+    names = table if isinstance(table, Mapping) else table.columns if _is_pandas(table) else arrow.column_names
+    # All names, for the message about a missing column.
+    metadata = {**(arrow.schema.metadata or {}), "ohmstrain_columns": ",".join(map(str, names))}
+    return in_seconds(arrow.select(places).replace_schema_metadata(metadata), origin or Origin())
 
 
 def _wanted(names: list[str], is_time: Callable[[str], bool]) -> list[str]:
@@ -69,11 +72,20 @@ def _is_time_kind(dtype: Any) -> bool:
     return getattr(dtype, "kind", None) in ("M", "m")
 
 
+def _is_time_column(cells: Any) -> bool:
+    """True if a column of a dict begins with timestamps or durations."""
+    try:
+        return _is_time(_array(cells[:100]).type)
+    except (TypeError, ValueError, KeyError, pa.ArrowException):
+        return False
+
+
 def _is_time(kind: pa.DataType) -> bool:
     return pa.types.is_timestamp(kind) or pa.types.is_duration(kind)
 
 
-def _in_seconds(arrow: pa.Table, origin: Origin) -> pa.Table:
+def in_seconds(arrow: pa.Table, origin: Origin) -> pa.Table:
+    """Convert the column of times, if they are timestamps or durations."""
     for place, field in enumerate(arrow.schema):
         if _is_time(field.type) and (field.name in TIMES or field.name not in COLUMNS):
             column = arrow.column(place)
@@ -89,7 +101,7 @@ def seconds(column: Any, field: pa.Field, origin: Origin) -> np.ndarray:
     if column.null_count:
         row = column.is_null().to_pylist().index(True)
         error = _core.OhmstrainError(f"row {row}: column `{field.name}`: expected a time, found none")
-        error.file, error.row, error.column = None, row, field.name
+        error.row, error.column = row, field.name
         raise error
     ticks = column.cast(pa.int64()).to_numpy()
     tick_ns = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}[field.type.unit]
