@@ -130,7 +130,8 @@ impl About {
     }
 }
 
-fn parsed<T: std::str::FromStr>(key: &str, text: Option<&str>, file: Option<&str>) -> PyResult<Option<T>>
+/// Parses the value of an argument; an error names the argument.
+pub fn parsed<T: std::str::FromStr>(key: &str, text: Option<&str>, file: Option<&str>) -> PyResult<Option<T>>
 where
     T::Err: std::fmt::Display,
 {

@@ -13,7 +13,7 @@ use ohmstrain_bench_data::{Metadata, ParquetText, ReadingKind, ReferenceQuantity
 use pyo3::prelude::*;
 use pyo3_arrow::PyRecordBatch;
 
-use crate::about::{ABOUT, About};
+use crate::about::{ABOUT, About, parsed};
 use crate::error::{Place, raise};
 
 /// Answers about files: the flags of `ohmstrain import`, and the units of a trace's columns.
@@ -42,7 +42,7 @@ pub struct Arguments {
     resistance_unit: Option<String>,
 }
 
-/// Parses the value of an argument; an error names the argument.
+/// Parses the value of an argument; an error names the argument and the value.
 fn value<T: FromStr<Err: std::fmt::Display>>(argument: &str, text: &str) -> PyResult<T> {
     text.parse().map_err(|error: T::Err| raise(&Place::default(), &format!("{argument}: {error}, found `{text}`")))
 }
@@ -63,10 +63,10 @@ impl Arguments {
     fn metadata(&self) -> PyResult<Metadata> {
         Ok(Metadata {
             gauge_length_mm: self.gauge_length_mm,
-            front_end: self.front_end.as_deref().map(|text| value("front_end", text)).transpose()?,
-            joint: self.joint.as_deref().map(|text| value("joint", text)).transpose()?,
-            strain_unit: self.strain_unit.as_deref().map(|text| value("strain_unit", text)).transpose()?,
-            resistance_unit: self.resistance_unit.as_deref().map(|text| value("resistance_unit", text)).transpose()?,
+            front_end: parsed("front_end", self.front_end.as_deref(), None)?,
+            joint: parsed("joint", self.joint.as_deref(), None)?,
+            strain_unit: parsed("strain_unit", self.strain_unit.as_deref(), None)?,
+            resistance_unit: parsed("resistance_unit", self.resistance_unit.as_deref(), None)?,
             ..Metadata::default()
         })
     }

@@ -47,6 +47,20 @@ def test_matlab_5(bench, tmp_path):
         oh.read(path)
 
 
+def test_two_matlab_files(bench, tmp_path):
+    """`sheet` is that of both, and a column of the second file has its number, among arrays of several lengths, too."""
+    io = needed("scipy.io")
+    meter = {"t": bench["time_s"], "R": bench["resistance_ohm"]}
+    stage = {"clock": bench["time_s"], "pos": bench["strain"], "gains": np.arange(7.0)}
+    for path, run in (("a.mat", meter), ("b.mat", stage)):
+        io.savemat(tmp_path / path, {"one": run, "two": {name: values[:5] for name, values in run.items()}})
+    units = {"time": "s", "resistance": "ohm", "strain": "fraction"}
+    for prefix, sheet in (("", "one"), ("one.", None)):
+        columns = {"time": f"{prefix}t", "resistance": f"{prefix}R", "reference-time": f"2:{prefix}clock", "strain": f"2:{prefix}pos"}
+        found = oh.read(tmp_path / "a.mat", tmp_path / "b.mat", sheet=sheet, columns=columns, units=units, align="none")
+        assert same(found, bench)
+
+
 def test_hdf5_and_matlab_7_3(bench, tmp_path):
     h5py = needed("h5py")
     with h5py.File(tmp_path / "run.h5", "w") as file:

@@ -107,6 +107,12 @@ def test_what_cannot_be_read(tmp_path):
         oh.read(tmp_path / "bad.csv", align="x")
     with pytest.raises(oh.OhmstrainError, match="columns: expected one of time.*found `ohms`"):
         oh.read(tmp_path / "bad.csv", columns={"ohms": 2})
+    with pytest.raises(oh.OhmstrainError, match="joint: .*, found `x`$") as raised:
+        oh.read(tmp_path / "bad.csv", joint="x")
+    assert str(raised.value).count("found") == 1
+    with pytest.raises(IsADirectoryError) as raised:
+        oh.read(tmp_path)
+    assert raised.value.filename == str(tmp_path)
     with pytest.raises(TypeError, match="at least one path"):
         oh.read()
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +20,10 @@ _MOST_COLUMNS = 256
 _FARTHEST_NS = 10**15
 
 
-def table(path: str, picked: Mapping[str, Any] | None, part: str | None) -> pa.Table | None:
+def table(path: str, picked: Iterable[str], part: str | None) -> pa.Table | None:
     """Return the columns of a container, all of one length; None for any other file.
 
-    ``picked`` are columns by role, ``part`` is an HDF5 group or a topic.
+    ``picked`` are requested columns, ``part`` is an HDF5 group or a topic.
     """
     reader = _reader(path)
     if reader is None:
@@ -43,7 +43,7 @@ def table(path: str, picked: Mapping[str, Any] | None, part: str | None) -> pa.T
             f"expected arrays of numbers{found}, found none; of a MATLAB table save "
             "table2struct(T, 'ToScalar', true), of a timeseries its Time and Data"
         )
-    names = [str(name) for name in (picked or {}).values() if name is not None and str(name) in arrays]
+    names = [name for name in picked if name in arrays]
     lengths = {name: len(arrays[name]) for name in names or arrays}
     if len(set(lengths.values())) > 1:
         shown = ", ".join(f"`{name}` ({length})" for name, length in list(lengths.items())[:12])

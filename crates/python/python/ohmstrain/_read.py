@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import re
@@ -130,7 +131,10 @@ def read(
     }
     names = [os.fspath(path) for path in paths]
     with tempfile.TemporaryDirectory(prefix="ohmstrain-") as folder:
-        readable = [_readable(name, place, folder, arguments, columns) for place, name in enumerate(names)]
+        readable = [_readable(name, place, folder, sheet, columns) for place, name in enumerate(names)]
+        if readable != names:
+            # Containers have taken it.
+            arguments["sheet"] = None
 
         def in_names(text: str) -> str:
             for given, read_from in zip(names, readable):
@@ -149,22 +153,29 @@ def read(
     return table.replace_schema_metadata(metadata) if readable != names else table
 
 
-def _readable(name: str, place: int, folder: str, arguments: dict[str, Any], columns: Mapping[str, Any] | None) -> str:
+def _readable(name: str, place: int, folder: str, sheet: str | None, columns: Mapping[str, Any] | None) -> str:
     """Return the file itself; for a container, a Parquet file with its columns."""
     try:
-        found = _containers.table(name, columns, arguments["sheet"])
+        found = _containers.table(name, _of_file(columns, place), sheet)
     except _core.OhmstrainError as error:
         named = _core.OhmstrainError(f"{name}: {error}")
-        named.file, named.row, named.column = name, None, None
+        named.file = name
         raise named from error.__cause__
     if found is None:
+        if os.path.isdir(name):
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), name)
         return name
-    arguments["sheet"] = None
     from pyarrow import parquet
 
     path = os.path.join(folder, f"{place}.parquet")
     parquet.write_table(found, path)
     return path
+
+
+def _of_file(columns: Mapping[str, Any] | None, place: int) -> list[str]:
+    """Return the columns that are requested of a file or of any: without the number of the file."""
+    named = (str(column) for column in (columns or {}).values() if column is not None)
+    return [column.removeprefix(f"{place + 1}:") for column in named]
 
 
 def _texts(given: str | Iterable[str]) -> list[str]:
