@@ -52,6 +52,9 @@ def test_recordings_are_estimated_as_on_the_command_line(hand):
     of_dict = joints.smooth({name: table[name].to_numpy() for name in table.columns})
     np.testing.assert_array_equal(of_dict["thumb_strain"], smoothed["thumb_strain"].to_numpy(float))
     assert isinstance(joints.smooth(pa.Table.from_pandas(table)), pa.Table)
+    # Dates and times begin at 0 s.
+    moments = pd.Timestamp("2025-10-31 18:35:45") + pd.to_timedelta((1e9 * table["time_s"]).round(), unit="ns")
+    assert_same(joints.smooth(table.assign(time_s=moments)), expected)
 
 
 def test_live_rows_are_those_of_the_recording(hand):

@@ -195,4 +195,4 @@ def _table(recording: Any, wanted: list[str]) -> pa.Table:
         cells = recording[name]
         return cells if isinstance(cells, (pa.Array, pa.ChunkedArray)) else pa.array(np.asarray(cells), from_pandas=True)
 
-    return pa.table({name: column(name) for name in (times[0], *wanted)})
+    return _tables.in_seconds(pa.table({name: column(name) for name in (times[0], *wanted)}), _tables.Origin())

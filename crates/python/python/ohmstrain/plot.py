@@ -7,10 +7,14 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from . import _tables
+from . import _core, _tables
 
 #: Colours of the report: estimate, reference, others.
 ESTIMATE, REFERENCE, OTHER = "#1f5fa8", "#222222", "#b3541e"
+
+
+#: Largest strain that is not taken for percent, as in calibration.
+_LARGEST_STRAIN = 3.0
 
 
 def _axes(ax: Any) -> Any:
@@ -31,7 +35,14 @@ def _column(table: Any, name: str) -> np.ndarray:
     return np.asarray(cells, dtype=float)
 
 
-def strain(estimates: Any, recording: Any = None, *, gauge_length_mm: float | None = None, ax: Any = None) -> Any:
+def strain(
+    estimates: Any,
+    recording: Any = None,
+    *,
+    gauge_length_mm: float | None = None,
+    strain_unit: str | None = None,
+    ax: Any = None,
+) -> Any:
     """Draw strain with its 95 % interval against time, and the reference, if the recording has one.
 
     Parameters
@@ -42,6 +53,8 @@ def strain(estimates: Any, recording: Any = None, *, gauge_length_mm: float | No
         The recording, for its reference.
     gauge_length_mm
         Length that converts a reference in ``displacement_mm`` to strain; without it such a reference is not drawn.
+    strain_unit
+        Unit of the reference, ``fraction`` or ``percent``. Without it a strain above 3 is an error.
     ax
         Axes to draw in; new ones by default.
 
@@ -49,6 +62,8 @@ def strain(estimates: Any, recording: Any = None, *, gauge_length_mm: float | No
     -------
     matplotlib.figure.Figure
     """
+    if strain_unit not in (None, "fraction", "percent"):
+        raise _core.OhmstrainError(f"strain_unit: expected `fraction` or `percent`, found `{strain_unit}`")
     ax = _axes(ax)
     names = list(estimates.columns) if hasattr(estimates, "columns") else list(estimates)
     names = estimates.column_names if isinstance(estimates, pa.Table) else names
@@ -61,11 +76,17 @@ def strain(estimates: Any, recording: Any = None, *, gauge_length_mm: float | No
     ax.plot(time_s, mean, color=ESTIMATE, lw=1, label="estimate")
     if recording is not None:
         table = _tables.to_arrow(recording)
-        reference, factor = quantity, scale
+        reference, factor = quantity, 1.0 if strain_unit == "percent" and quantity == "strain" else scale
         if gauge_length_mm is not None and quantity == "strain" and "displacement_mm" in table.column_names:
             reference, factor = "displacement_mm", scale / gauge_length_mm
         if reference in table.column_names:
-            ax.plot(_column(table, "time_s"), factor * _column(table, reference), color=REFERENCE, lw=0.8, label="reference")
+            values = _column(table, reference)
+            if reference == "strain" and strain_unit is None and np.nanmax(values, initial=0.0) > _LARGEST_STRAIN:
+                raise _core.OhmstrainError(
+                    f'column `strain`: strains of up to {np.nanmax(values):.3g}: are they in percent? Then say so with strain_unit="percent"'
+                )
+            times = _column(table, "time_s") if "time_s" in table.column_names else _column(table, "time_us") / 1e6
+            ax.plot(times, factor * values, color=REFERENCE, lw=0.8, label="reference")
     ax.set(xlabel="time, s", ylabel=unit)
     ax.legend(loc="lower right", bbox_to_anchor=(1, 1), frameon=False, ncols=3)
     return ax.figure
