@@ -68,6 +68,7 @@ mod text;
 #[cfg(feature = "trace")]
 pub mod trace;
 mod unit_doubt;
+mod use_doubt;
 mod validity;
 
 pub use builder::FilterBuilder;
@@ -111,6 +112,7 @@ pub use temperature::Thermometer;
 #[cfg(feature = "calibrate")]
 pub use tested::Kept;
 pub use unit_doubt::{UnitDoubt, UnitGuess};
+pub use use_doubt::UseDoubt;
 pub use validity::{Beyond, Extrapolation, ValiditySeen, ValidityWatch};
 
 #[cfg(feature = "calibrate")]

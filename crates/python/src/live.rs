@@ -41,6 +41,10 @@ pub struct LaggedFilter {
     columns: Vec<Column>,
 }
 
+/// Warning of readings without temperatures for a filter that takes them.
+const BLIND: &str =
+    "no column `temperature_c`: intervals are too narrow; use the filter of sensor.without_temperature()";
+
 /// Locks a filter for one caller at a time, who waits without holding the interpreter. A step either succeeds or leaves the
 /// filter as it was, even if it panics.
 fn locked<'a, T>(filter: &'a Mutex<T>, py: Python) -> MutexGuard<'a, T> {
@@ -161,9 +165,12 @@ impl LiveFilter {
         recording.check_kind(&self.sensor)?;
         if !*is_begun {
             recording.check_unit(&self.sensor, *rest_resistance)?;
-            let blind = recording.without_temperatures(&self.sensor, *thermometer);
-            watch.warnings.extend(blind);
+            let is_blind = !recording.has_temperatures() && thermometer.last_c().is_none();
+            if is_blind && self.sensor.params().temperature.is_some() {
+                watch.warnings.push(format!("{}{BLIND}", recording.before()));
+            }
         }
+        watch.warnings.extend(recording.use_doubts(&self.sensor, !*is_begun));
         let mut estimates = Estimates::new(self.columns.clone(), recording.time_s.len());
         py.detach(|| {
             recording.filtered(filter, |row, estimate| {

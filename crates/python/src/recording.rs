@@ -9,7 +9,8 @@ use arrow_array::{Array, RecordBatch};
 use arrow_cast::cast;
 use arrow_schema::{ArrowError, DataType, Schema};
 use ohmstrain::{
-    Error, Estimate, Filter, FilterBuilder, JointParams, Quantity, Reading, ReadingUnit, Sensor, Thermometer,
+    Error, Estimate, Filter, FilterBuilder, Interface, JointParams, Quantity, Reading, ReadingUnit, Sensor,
+    Thermometer, UseDoubt,
 };
 use ohmstrain_calib::Samples;
 use pyo3::prelude::*;
@@ -37,6 +38,8 @@ pub struct Recording {
     pub reference: Option<(Quantity, Vec<f64>)>,
     /// The joint that the sensor is mounted on.
     pub joint: Option<JointParams>,
+    /// Number of temperatures that counted as missing.
+    far_temperatures: usize,
     /// True if the user has given the unit of the strains.
     knows_strain_unit: bool,
     /// True if the user, or electronics, have given the unit of the readings.
@@ -99,6 +102,7 @@ impl Recording {
             converter,
             unit,
             temperature_c,
+            far_temperatures: 0,
             reference,
             joint,
             knows_strain_unit,
@@ -134,17 +138,29 @@ impl Recording {
 
     /// Converts its readings to a thermometer's reference temperature.
     pub fn convert(&mut self, mut thermometer: Thermometer) {
+        let before = thermometer.implausible();
         for row in 0..self.readings.len() {
             self.readings[row] = thermometer.at_reference(self.readings[row], self.temperature_c(row));
         }
+        self.far_temperatures = thermometer.implausible() - before;
     }
 
-    /// Returns a warning that a sensor's filter has had no temperature, though its intervals take one for granted.
-    pub fn without_temperatures(&self, sensor: &Sensor, thermometer: Thermometer) -> Option<String> {
-        let is_blind = self.temperature_c.is_none() && thermometer.last_c().is_none();
-        let text =
-            "no column `temperature_c`: intervals are too narrow; use the filter of sensor.without_temperature()";
-        (is_blind && sensor.params().temperature.is_some()).then(|| format!("{}{text}", self.before()))
+    /// Returns warnings of temperatures that counted as missing, and of times that may be milliseconds, in the first rows of a filter.
+    pub fn use_doubts(&self, sensor: &Sensor, are_first: bool) -> Vec<String> {
+        let count = self.far_temperatures;
+        let far = (count > 0).then_some(UseDoubt::FarTemperatures { count });
+        let clock = sensor.clock_doubt(self.time_s.iter().copied()).filter(|_| are_first);
+        far.into_iter().chain(clock).map(|doubt| self.doubted(doubt)).collect()
+    }
+
+    /// Returns a doubt about this recording as a warning.
+    pub fn doubted(&self, doubt: UseDoubt) -> String {
+        format!("{}{}", self.before(), doubt.text(Interface::Python))
+    }
+
+    /// True if it has a column of temperatures.
+    pub const fn has_temperatures(&self) -> bool {
+        self.temperature_c.is_some()
     }
 
     /// Returns the temperature of a row, °C; NaN if it was not measured.

@@ -20,6 +20,13 @@ pub struct Sensor {
 }
 
 impl Sensor {
+    /// Returns warnings about the use of a recording for this sensor.
+    fn use_doubts(&self, recording: &Recording) -> Vec<String> {
+        let missing = self.sensor.no_temperatures_doubt().filter(|_| !recording.has_temperatures());
+        let missing = missing.map(|doubt| recording.doubted(doubt));
+        missing.into_iter().chain(recording.use_doubts(&self.sensor, true)).collect()
+    }
+
     /// Converts the readings of a recording to the sensor's reference temperature and checks them; returns the sensor on its joint, if it
     /// has one.
     fn for_recording(&self, recording: &mut Recording, options: &Options) -> PyResult<ohmstrain::Sensor> {
@@ -150,7 +157,8 @@ impl Sensor {
         let (estimates, warnings) = py.detach(|| {
             let mut estimates = Estimates::new(columns, recording.time_s.len());
             let mut watch = Watch::new(&sensor, rest, &options.known);
-            watch.warnings = of_known(&sensor, options.initial_strain, &options.known, recording.times());
+            watch.warnings = self.use_doubts(&recording);
+            watch.warnings.extend(of_known(&sensor, options.initial_strain, &options.known, recording.times()));
             recording.filtered(&mut filter, |row, estimate| {
                 estimates.put(row, std::slice::from_ref(estimate));
                 watch.see(&recording, row, estimate.strain_rate);
@@ -175,7 +183,8 @@ impl Sensor {
                 rates[rows].iter_mut().zip(segment).for_each(|(rate, row)| *rate = row.strain_rate);
             })?;
             let mut watch = Watch::new(&sensor, rest, &options.known);
-            watch.warnings = of_known(&sensor, options.initial_strain, &options.known, recording.times());
+            watch.warnings = self.use_doubts(&recording);
+            watch.warnings.extend(of_known(&sensor, options.initial_strain, &options.known, recording.times()));
             rates.iter().enumerate().for_each(|(row, rate)| watch.see(&recording, row, *rate));
             Ok::<_, PyErr>((estimates, watch.warnings))
         })?;

@@ -1,12 +1,13 @@
 """Recordings and live readings with temperatures, as the command line has them."""
 
 import pickle
+import subprocess
 import warnings
 
 import numpy as np
 import pandas as pd
 import pytest
-from conftest import read, run
+from conftest import PROGRAM, read, run
 
 import ohmstrain as oh
 
@@ -119,6 +120,8 @@ def test_a_running_filter_without_temperatures_is_doubted(chamber):
     blind = rows[["time_s", "resistance_ohm"]]
     with pytest.warns(oh.OhmstrainWarning, match=r"no column `temperature_c`: .* sensor.without_temperature\(\)"):
         sensor.filter().run(blind)
+    with pytest.warns(oh.OhmstrainWarning, match="1 temperature far from those of the calibration counted as missing"):
+        sensor.filter().run(rows.assign(temperature_c=rows["temperature_c"].where(rows.index != 7, -127.0)))
     live, without = sensor.filter(), sensor.without_temperature().filter()
     live.step(-1.0, None, 25.0)
     with warnings.catch_warnings():
@@ -129,3 +132,27 @@ def test_a_running_filter_without_temperatures_is_doubted(chamber):
     without.save(chamber / "blind.toml")
     with pytest.raises(oh.OhmstrainError, match="readings with or without temperatures"):
         sensor.filter(resume=chamber / "blind.toml")
+
+
+def test_warnings_are_those_of_the_program(chamber):
+    """No temperatures, a probe that is disconnected, milliseconds."""
+    sensor, rows = oh.Sensor.load(chamber / "sensor.toml"), read(chamber / "trace.csv").head(300)[NAMES]
+    far = rows.assign(temperature_c=rows["temperature_c"].where((rows.index < 90) | (rows.index > 99), -127.0))
+    slow = rows.assign(time_s=1000 * rows["time_s"])
+    for table, texts in [
+        (rows.drop(columns="temperature_c"), ["no column `temperature_c`: intervals are wider by what 10 to 40 °C do"]),
+        (far, ["10 temperatures far from those of the calibration counted as missing: is the probe connected?"]),
+        (slow, ["rows are 500 s apart, 0.5 s in the calibration: if `time_s` is in milliseconds, "]),
+    ]:
+        table.to_csv(chamber / "odd.csv", index=False)
+        for command in ("filter", "smooth"):
+            words = [PROGRAM, command, "odd.csv", "--sensor", "sensor.toml", "-o", "odd_estimates.csv", "--force"]
+            printed = subprocess.run(words, cwd=chamber, capture_output=True, text=True, check=True).stderr
+            with warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always")
+                getattr(sensor, command)(table, name="odd.csv")
+            found = "\n".join(str(one.message) for one in caught)
+            for text in texts:
+                assert text in printed and text in found, (command, text)
+            unlike = printed.count("of the rows are flagged `extrapolated`")
+            assert found.count("odd.csv: ") == printed.count("warning: odd.csv") - unlike

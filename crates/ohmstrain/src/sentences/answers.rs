@@ -3,9 +3,10 @@
 #[cfg(feature = "calibrate")]
 use ohmstrain_calib::Lag;
 
+use super::number::significant;
 #[cfg(feature = "calibrate")]
 use crate::{CalibrationDoubt, LagDoubt};
-use crate::{Quiet, ReferenceDoubt, StartDoubt, UnitDoubt, UnitGuess, UnusedKnown};
+use crate::{Quiet, ReferenceDoubt, StartDoubt, UnitDoubt, UnitGuess, UnusedKnown, UseDoubt};
 
 /// Interface through which a sensor is used and doubts are answered.
 ///
@@ -106,6 +107,41 @@ impl UnusedKnown {
         match at {
             Interface::CommandLine => format!("--known {time_s}:{strain} {self}"),
             Interface::Python => format!("known: ({time_s}, {strain}) {self}"),
+        }
+    }
+}
+
+impl UseDoubt {
+    /// Returns the doubt, with its answer if there is one.
+    ///
+    /// ```
+    /// let doubt = ohmstrain::UseDoubt::FarTemperatures { count: 3 };
+    /// assert!(doubt.text(ohmstrain::Interface::Python).starts_with("3 temperatures far from those of the calibration"));
+    /// ```
+    #[must_use]
+    pub fn text(&self, at: Interface) -> String {
+        match *self {
+            Self::Milliseconds { step_s, usual_s } => {
+                let (step, usual) = (significant(step_s, 3), significant(usual_s, 3));
+                let answer = at.of(
+                    "convert the recording with `ohmstrain import FILE --unit time=ms -o trace.csv`",
+                    "divide it by 1000, or read the file with read(FILE, units={\"time\": \"ms\"})",
+                );
+                format!(
+                    "rows are {step} s apart, {usual} s in the calibration: if `time_s` is in milliseconds, {answer}"
+                )
+            }
+            Self::NoTemperatures { lower_c, upper_c } => format!(
+                "no column `temperature_c`: intervals are wider by what {} to {} °C do to the strain, as in the calibration",
+                significant(lower_c, 3),
+                significant(upper_c, 3)
+            ),
+            Self::FarTemperatures { count } => {
+                let plural = if count == 1 { "" } else { "s" };
+                format!(
+                    "{count} temperature{plural} far from those of the calibration counted as missing: is the probe connected?"
+                )
+            }
         }
     }
 }
