@@ -10,8 +10,10 @@ pub(crate) fn extent(values: impl Iterator<Item = f64>) -> (f64, f64) {
     values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
 }
 
+/// Longest gap that is bridged, in typical steps.
+pub(crate) const LONGEST_GAP: f64 = 10.0;
+
 /// Returns the typical step of times, if they increase.
-#[cfg(feature = "import")]
 pub(crate) fn typical_step(times: &[f64]) -> Option<f64> {
     median(times.windows(2).map(|pair| pair[1] - pair[0]).collect()).filter(|step| *step > 0.0)
 }

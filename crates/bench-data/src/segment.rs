@@ -2,7 +2,7 @@ use std::ops::Range;
 
 use ohmstrain_model::Phase;
 
-use crate::order::{extent, median};
+use crate::order::{LONGEST_GAP, extent, median, typical_step};
 
 /// A range of rows in one phase.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -26,13 +26,15 @@ const SMALLEST_SHARE: f64 = 0.01;
 /// Widest window of the rate, rows to each side.
 const WIDEST: usize = 128;
 
-/// Cuts a reference into phases. The segments cover all rows, in order, and neighbours differ in phase.
+/// Cuts a reference into phases. The segments are in order and cover all rows but those of long gaps; adjoining ones differ
+/// in phase.
 ///
 /// The rate is the slope of a straight line through a window of rows, which is widened until the reference's own noise
 /// no longer reaches the threshold. The threshold is 2 to 8 % of the *typical* rate, depending on the noise. The
 /// typical rate is that at which half the distance is travelled, so that long holds do not count. A part that is
 /// shorter than the window, or than 12 % of the time of a full stretch, is merged into its neighbours; a movement of
-/// less than 1 % of a full stretch is a hold. Missing values (NaN) are interpolated linearly.
+/// less than 1 % of a full stretch is a hold. Missing values (NaN) are interpolated linearly, but for gaps longer than ten
+/// steps and than the shortest part.
 ///
 /// ```
 /// use ohmstrain_bench_data::segment;
@@ -45,7 +47,8 @@ const WIDEST: usize = 128;
 #[must_use]
 pub fn segment(time_s: &[f64], strain: &[f64]) -> Vec<Segment> {
     let rows = time_s.len().min(strain.len());
-    let (time_s, strain) = (&time_s[..rows], &bridge(&time_s[..rows], &strain[..rows]));
+    let (time_s, reference) = (&time_s[..rows], &strain[..rows]);
+    let strain = &bridge(time_s, reference);
     if rows == 0 {
         return Vec::new();
     }
@@ -59,7 +62,35 @@ pub fn segment(time_s: &[f64], strain: &[f64]) -> Vec<Segment> {
     merge_short(&mut segments, time_s, motion.shortest_s);
     still_small(&mut segments, strain);
     merge_short(&mut segments, time_s, motion.shortest_s);
-    segments
+    let segments = gaps(time_s, reference, motion.shortest_s).iter().fold(segments, without);
+    // The ends of a line across a gap reach a window's width beyond it.
+    let merged = |part: &[Segment]| {
+        let mut part = part.to_vec();
+        merge_short(&mut part, time_s, motion.shortest_s);
+        part
+    };
+    segments.chunk_by(|a, b| a.rows.end == b.rows.start).flat_map(merged).collect()
+}
+
+/// Returns the rows without a reference where it is missing for longer than `least_s` and than ten of its usual steps.
+fn gaps(time_s: &[f64], reference: &[f64], least_s: f64) -> Vec<Range<usize>> {
+    let known: Vec<usize> = (0..reference.len()).filter(|row| reference[*row].is_finite()).collect();
+    let (Some(first), Some(last)) = (known.first(), known.last()) else { return Vec::new() };
+    let known_s: Vec<f64> = known.iter().map(|row| time_s[*row]).collect();
+    let longest_s = (LONGEST_GAP * typical_step(&known_s).unwrap_or(0.0)).max(least_s);
+    let inner = known.windows(2).map(|pair| (pair[0] + 1..pair[1], pair[0], pair[1]));
+    let ends = [(0..*first, 0, *first), (last + 1..reference.len(), *last, reference.len() - 1)];
+    let all = inner.chain(ends).filter(|(rows, ..)| !rows.is_empty());
+    all.filter(|(_, a, b)| time_s[*b] - time_s[*a] > longest_s).map(|(rows, ..)| rows).collect()
+}
+
+/// Returns the segments without the rows of a gap.
+fn without(segments: Vec<Segment>, gap: &Range<usize>) -> Vec<Segment> {
+    let parts = |Segment { phase, rows }| {
+        let (before, after) = (rows.start..rows.end.min(gap.start), rows.start.max(gap.end)..rows.end);
+        [before, after].into_iter().filter(|rows| !rows.is_empty()).map(move |rows| Segment { phase, rows })
+    };
+    segments.into_iter().flat_map(parts).collect()
 }
 
 /// Motion of the body, to the extent that it exceeds the noise.

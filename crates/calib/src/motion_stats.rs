@@ -1,6 +1,5 @@
 use crate::order::{self, extent, sorted};
-use crate::samples::central_rate;
-use crate::samples::{Samples, filled_strain};
+use crate::samples::{KnownPart, Samples, central_rate, filled_strain, known_parts};
 
 /// Statistics of the strain's motion in the recordings.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,18 +33,34 @@ pub(crate) struct MotionStats {
 const HALF_WINDOW: usize = 2;
 
 impl MotionStats {
+    /// Collects the statistics of the parts between long gaps in the references; of whole recordings, with gaps interpolated, if nothing
+    /// moves in these parts.
     pub(crate) fn new(recordings: &[Samples]) -> Self {
+        let parts: Vec<Vec<KnownPart>> = recordings.iter().map(known_parts).collect();
+        let known = parts.iter().all(|parts| !parts.is_empty()).then(|| Self::of_parts(recordings, &parts));
+        let whole = |samples: &Samples| vec![(0..samples.len(), filled_strain(samples))];
+        known
+            .filter(|stats| stats.strokes > 0.0)
+            .unwrap_or_else(|| Self::of_parts(recordings, &recordings.iter().map(whole).collect::<Vec<_>>()))
+    }
+
+    fn of_parts(recordings: &[Samples], parts: &[Vec<KnownPart>]) -> Self {
         let (mut strains, mut rates) = (Vec::new(), Vec::new());
         let mut phases = PhaseDurations::default();
         let mut times = Vec::new();
         let mut longest_s = 0.0_f64;
-        for samples in recordings {
-            let strain = filled_strain(samples);
-            let rate = moving_mean(&central_rate(samples.time_s, &strain));
-            times.push(correlation_time(samples.time_s, &rate));
-            phases.add(samples.time_s, &rate);
-            rates.extend(rate);
-            strains.push(strain);
+        for (samples, parts) in recordings.iter().zip(parts) {
+            let longest = parts.iter().map(|(rows, _)| rows.len()).max();
+            for (rows, strain) in parts {
+                let time_s = &samples.time_s[rows.clone()];
+                let rate = moving_mean(&central_rate(time_s, strain));
+                if Some(rows.len()) == longest {
+                    times.push(correlation_time(time_s, &rate));
+                }
+                phases.add(time_s, &rate);
+                rates.extend(rate);
+                strains.push(strain.clone());
+            }
             longest_s = longest_s.max(samples.duration_s());
         }
         let (low, high) = extent(strains.iter().flatten().copied());
@@ -150,9 +165,9 @@ impl PhaseDurations {
     }
 }
 
-/// Returns the direction of each rate: 1, -1, or 0 at rest.
+/// Returns the direction of each rate: 1, -1, or 0 at rest and where it is unknown (NaN).
 pub(crate) fn directions(rate: &[f64]) -> Vec<i8> {
-    let speeds = sorted(rate.iter().map(|v| v.abs()));
+    let speeds = sorted(rate.iter().map(|v| v.abs()).filter(|v| v.is_finite()));
     let rest = REST_SHARE * speeds.get(speeds.len().saturating_sub(1) * 9 / 10).copied().unwrap_or(0.0);
     rate.iter().map(|v| i8::from(*v > rest) - i8::from(*v < -rest)).collect()
 }
@@ -204,6 +219,16 @@ mod tests {
         let ramps = |t: f64| 0.3 * ((t % 30.0) / 5.0).min(1.0).min((20.0 - t % 30.0) / 5.0).max(0.0);
         let held = hold_s(ramps).unwrap();
         assert!((held - 10.0).abs() < 0.5, "{held} s");
+    }
+
+    /// Tests the same with a reference that fails at rest, from 10 to 70 s, and with one that is known at rest only.
+    #[test]
+    fn a_gap_in_the_reference_is_no_motion_and_no_hold() {
+        let ramps = |t: f64| 0.3 * ((t % 30.0) / 5.0).min(1.0).min((20.0 - t % 30.0) / 5.0).max(0.0);
+        let held = hold_s(|t| if (10.0..70.0).contains(&t) { f64::NAN } else { ramps(t) }).unwrap();
+        assert!((held - 10.0).abs() < 1.0, "{held} s");
+        let at_rest = |t: f64| if [0.0, 0.3].contains(&ramps(t)) { ramps(t) } else { f64::NAN };
+        assert!((hold_s(at_rest).unwrap() - 10.0).abs() < 1.0);
     }
 
     /// Tests one extension in 5 s, held for 95 s with a noisy reference, 100 rows a second: a path in steps of a tenth loses a tenth at most.

@@ -1,3 +1,5 @@
+use std::ops::Range;
+
 use thiserror::Error;
 
 use crate::order::{extent, median, range};
@@ -199,6 +201,9 @@ impl<'a> Samples<'a> {
 /// Least number of complete rows in a recording for calibration: several per parameter of the smallest law.
 pub(crate) const FEWEST_ROWS: usize = 60;
 
+/// Longest gap in a reference over which its values are interpolated, in usual steps between them.
+pub(crate) const LONGEST_GAP: f64 = 10.0;
+
 /// Returns the strain without gaps: missing values are interpolated in time, and the ends held.
 #[must_use]
 pub(crate) fn filled_strain(samples: &Samples) -> Vec<f64> {
@@ -215,6 +220,38 @@ pub(crate) fn filled_strain(samples: &Samples) -> Vec<f64> {
         }
     }
     filled
+}
+
+/// Returns the strain with missing values interpolated in time, and the ends held; NaN in long gaps and at long ends without a reference.
+#[must_use]
+pub(crate) fn bridged_strain(samples: &Samples) -> Vec<f64> {
+    let known: Vec<usize> = (0..samples.len()).filter(|&k| samples.strain[k].is_finite()).collect();
+    let mut strain = filled_strain(samples);
+    let (Some(&first), Some(&last)) = (known.first(), known.last()) else { return strain };
+    let known_s: Vec<f64> = known.iter().map(|&k| samples.time_s[k]).collect();
+    let longest_s = LONGEST_GAP * usual_step_s(std::iter::once(&known_s[..]));
+    let gaps = known.windows(2).map(|pair| (pair[0] + 1..pair[1], pair[0], pair[1]));
+    let end = samples.len() - 1;
+    for (rows, a, b) in gaps.chain([(0..first, 0, first), (last + 1..samples.len(), last, end)]) {
+        if samples.time_s[b] - samples.time_s[a] > longest_s {
+            strain[rows].fill(f64::NAN);
+        }
+    }
+    strain
+}
+
+/// Rows between long gaps in a reference, and their strain without gaps.
+pub(crate) type KnownPart = (Range<usize>, Vec<f64>);
+
+/// Returns the parts of a recording between long gaps in its reference, of two rows and more.
+pub(crate) fn known_parts(samples: &Samples) -> Vec<KnownPart> {
+    let strain = bridged_strain(samples);
+    let mut start = 0;
+    let part = |run: &[f64]| {
+        start += run.len();
+        (run.len() > 1 && run[0].is_finite()).then(|| (start - run.len()..start, run.to_vec()))
+    };
+    strain.chunk_by(|a, b| a.is_finite() == b.is_finite()).filter_map(part).collect()
 }
 
 /// Returns the usual time between rows, s: the median step over all recordings.

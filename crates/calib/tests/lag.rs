@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use ohmstrain_calib::{Lag, LagError, Samples, reference_lag};
+use ohmstrain_calib::{Lag, LagError, Samples, aligned, reference_lag};
 
 /// Returns the lag found for a polynomial gauge and two branches with different gains for stretching and releasing, no dash-pot, in
 /// explicit Euler steps of a millisecond; ten rows a second for 150 s. The reference is `lag_s` late.
@@ -100,6 +100,22 @@ fn a_stroke_or_two_tell_no_lag() {
     for (time_s, reading, strain) in [of_relaxing(stroke, 60, 0.0), of_relaxing(hold, 20, 0.0)] {
         let found = reference_lag(&Samples::new(&time_s, &reading, &strain).unwrap());
         assert_eq!(found, Err(LagError::Short));
+    }
+}
+
+/// A reference in every other row, which fails for 3 s; its usual step is 0.2 s, ten of them are 2 s.
+#[test]
+fn a_moved_reference_keeps_its_gaps() {
+    let time_s: Vec<f64> = (0..200).map(|k| 0.1 * f64::from(k)).collect();
+    let known = |(k, t): (usize, &f64)| if k % 2 == 0 && !(8.1..11.0).contains(t) { 0.01 * t } else { f64::NAN };
+    let strain: Vec<f64> = time_s.iter().enumerate().map(known).collect();
+    let moved = aligned(&Samples::new(&time_s, &vec![1000.0; 200], &strain).unwrap(), 0.55);
+    for (t, moved) in time_s.iter().zip(moved) {
+        let then_s = t + 0.55;
+        match then_s {
+            ..8.0 | 11.0..19.8 => assert!((moved - 0.01 * then_s).abs() < 1e-12, "{moved} at {t}"),
+            _ => assert!(moved.is_nan(), "{moved} at {t}"),
+        }
     }
 }
 

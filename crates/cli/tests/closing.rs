@@ -139,6 +139,20 @@ fn the_verdict_is_of_the_worst_that_is_known() {
     }
 }
 
+/// The reference fails for 40 s after the calibration, and is not interpolated.
+#[test]
+fn rows_without_a_reference_are_not_tested() {
+    let bench = Bench::calibrated();
+    let (mut known, until) = (0, CALIBRATED_UNTIL.parse::<f64>().unwrap());
+    let gap = change_rows(&bench.read("trace.csv"), |_, cells| match cells[0].parse::<f64>().unwrap() {
+        320.0..360.0 => cells[2].clear(),
+        time_s => known += i32::from(time_s >= until),
+    });
+    bench.write("trace.csv", gap);
+    let json: Value = serde_json::from_str(&bench.run(&[&CALIBRATE[..], &["--json"]].concat()).ok()).unwrap();
+    assert_eq!(json["tested"]["filter"]["n"], known, "{json}");
+}
+
 /// A calibration on all rows has nothing to test on, and only held-out scores are printed.
 #[test]
 fn a_calibration_on_all_rows_is_tested_on_none() {

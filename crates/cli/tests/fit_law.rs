@@ -184,7 +184,7 @@ fn what_cannot_be_fitted_is_refused() {
     refuses(&["--law", "kww", "--modulus", "eq6"], ARGUMENTS, "--modulus is for eq8, eq9 and eq8+eq9, not for kww");
     refuses(&["--law", "eq9", "--segment", "extend"], ARGUMENTS, "eq9 is not about segments of the kind extend");
     refuses(
-        &["--law", "eq9", "--segment", "hold:9"],
+        &["--law", "eq9", "--segment", "hold:2,hold:9"],
         CONTENT,
         "trace.csv: expected segments hold:9 for eq9, found 2 extend, 5 hold, 2 retract",
     );

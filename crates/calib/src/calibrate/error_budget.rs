@@ -1,7 +1,7 @@
 use crate::law::fit::CrossFit;
 use crate::motion_stats::{directions, moving_mean};
 use crate::order::median;
-use crate::samples::{Samples, central_rate, filled_strain, reading_range};
+use crate::samples::{Samples, central_rate, known_parts, reading_range};
 use ohmstrain_sensor::ErrorBudget;
 
 /// Splits the error on held-out blocks into its shares.
@@ -55,10 +55,14 @@ fn white_variance(x: &[f64]) -> f64 {
 pub(crate) struct Direction(i8);
 
 impl Direction {
-    /// Returns the direction in every row of a recording.
+    /// Returns the direction in every row of a recording; zero in long gaps of its reference.
     pub(crate) fn of_rows(samples: &Samples) -> Vec<Self> {
-        let rate = moving_mean(&central_rate(samples.time_s, &filled_strain(samples)));
-        directions(&rate).into_iter().map(Self).collect()
+        let mut rates = vec![f64::NAN; samples.len()];
+        for (rows, strain) in known_parts(samples) {
+            let rate = moving_mean(&central_rate(&samples.time_s[rows.clone()], &strain));
+            rates[rows].copy_from_slice(&rate);
+        }
+        directions(&rates).into_iter().map(Self).collect()
     }
 }
 

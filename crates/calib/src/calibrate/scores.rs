@@ -2,6 +2,7 @@ use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
 use crate::calibrate::left_out::REFERENCE_SD;
 use crate::order::{self, range};
+use crate::samples::{LONGEST_GAP, usual_step_s};
 use ohmstrain_sensor::Scores;
 
 /// Error, as a fraction of full scale, and duration, s, beyond which the estimate is taken to follow another solution.
@@ -56,8 +57,18 @@ pub(crate) fn score_of_full_scale(rows: &[ScoredRow]) -> Option<Scores> {
     score(rows).filter(|scores| scores.rmse_percent_fs.is_finite())
 }
 
-/// Returns the share of the time between the first and the last row in which the estimate follows another solution.
+/// Returns the share of the scored time in which the estimate follows another solution; gaps between scored rows are not scored.
 fn wrong_branch(rows: &[&ScoredRow], full_scale: f64) -> f64 {
+    let time_s: Vec<f64> = rows.iter().map(|row| row.time_s).collect();
+    let longest_s = LONGEST_GAP * usual_step_s(std::iter::once(&time_s[..]));
+    let parts = rows.chunk_by(|a, b| b.time_s - a.time_s <= longest_s).map(|part| wrong_time_s(part, full_scale));
+    let (wrong_s, total_s) =
+        parts.fold((0.0, 0.0), |(wrong_s, total_s), (wrong, all)| (wrong_s + wrong, total_s + all));
+    if total_s > 0.0 { wrong_s / total_s } else { 0.0 }
+}
+
+/// Returns the time in which the estimate follows another solution, and that between the first and the last row, s.
+fn wrong_time_s(rows: &[&ScoredRow], full_scale: f64) -> (f64, f64) {
     let wrong = |row: &ScoredRow| (row.strain - row.truth).abs() > WRONG_BRANCH.0 * full_scale;
     let (mut total, mut since) = (0.0, None);
     for (k, row) in rows.iter().enumerate() {
@@ -72,7 +83,7 @@ fn wrong_branch(rows: &[&ScoredRow], full_scale: f64) -> f64 {
         }
     }
     let (first, last) = (rows.first().map_or(0.0, |row| row.time_s), rows.last().map_or(0.0, |row| row.time_s));
-    if last > first { total / (last - first) } else { 0.0 }
+    (total, last - first)
 }
 
 impl ScoredRow {
@@ -116,6 +127,17 @@ mod tests {
         };
         let rows: Vec<ScoredRow> = (0..=40).map(row).collect();
         assert_eq!(score(&rows).unwrap().wrong_branch, 2.0 / 40.0);
+    }
+
+    /// One row a second; errors of 0.3 before and after a gap, for a second each, and no truth in between.
+    #[test]
+    fn a_gap_is_no_wrong_branch() {
+        let row = |k: u32| {
+            let truth = if (12..40).contains(&k) { f64::NAN } else { f64::from(k % 2) };
+            let error = if (11..=40).contains(&k) { 0.3 } else { 0.0 };
+            ScoredRow { time_s: f64::from(k), truth, strain: truth + error, sd: None }
+        };
+        assert_eq!(score(&(0..=60).map(row).collect::<Vec<_>>()).unwrap().wrong_branch, 0.0);
     }
 
     /// Neither zero error over zero full scale nor an error of a NaN estimate is a number.

@@ -1,6 +1,6 @@
 use std::ops::Range;
 
-use crate::samples::{Samples, filled_strain};
+use crate::samples::{Samples, bridged_strain};
 
 /// A part of a recording in which the strain is constant.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,7 +25,7 @@ const STEP_S: f64 = 0.2;
 /// Returns all holds of at least `least_s`, and never less than 20 s, in order of time. `span` is the range of the strain.
 #[must_use]
 pub fn holds(samples: &Samples, span: f64, least_s: f64) -> Vec<Hold> {
-    let (time_s, strain) = (samples.time_s, filled_strain(samples));
+    let (time_s, strain) = (samples.time_s, bridged_strain(samples));
     let rows = thinned(time_s);
     let (mut found, mut start) = (Vec::new(), 0);
     while start < rows.len() {
@@ -54,12 +54,12 @@ fn thinned(time_s: &[f64]) -> Vec<usize> {
     rows
 }
 
-/// Returns the last of `rows` up to which the strain stays within a range of `width`, from `start` on.
+/// Returns the last of `rows` up to which the strain is known and stays within a range of `width`, from `start` on.
 fn standing_still(rows: &[usize], strain: &[f64], start: usize, width: f64) -> usize {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     let stays = rows[start..].iter().take_while(|&&row| {
         (low, high) = (strain[row].min(low), strain[row].max(high));
-        high - low <= width
+        strain[row].is_finite() && high - low <= width
     });
     start + stays.count().saturating_sub(1)
 }
@@ -109,5 +109,9 @@ mod tests {
         let sparse: Vec<f64> =
             strains.iter().enumerate().map(|(k, x)| if k % 10 == 0 { *x } else { f64::NAN }).collect();
         assert_eq!(holds(&Samples::new(&time_s, &reading, &sparse).unwrap(), 0.3, 0.0).len(), 2);
+        // The reference fails for 30 s of the first hold.
+        let failing: Vec<f64> =
+            time_s.iter().zip(strains).map(|(t, x)| if (20.0..50.0).contains(t) { f64::NAN } else { x }).collect();
+        assert_eq!(holds(&Samples::new(&time_s, &reading, &failing).unwrap(), 0.3, 0.0).len(), 1);
     }
 }

@@ -137,7 +137,7 @@ impl TraceFile {
         }
     }
 
-    /// Moves a reference that is late by `lag_s`.
+    /// Moves a reference that is late by `lag_s`; one that is on time stays as it is.
     ///
     /// # Errors
     /// If there is no reference, or a row is invalid.
@@ -147,6 +147,9 @@ impl TraceFile {
         let (time_s, reading, sd) = (samples.time_s(), samples.reading(), self.reference_sd());
         let named = |error| TraceFileError::Samples { name: self.name.clone(), error };
         let of_sd = (!sd.is_empty()).then(|| Samples::new(time_s, reading, sd)).transpose().map_err(named)?;
+        if lag_s == 0.0 {
+            return Ok(());
+        }
         let sd = of_sd.map(|of_sd| aligned(&of_sd, lag_s)).unwrap_or_default();
         if let Some(reference) = &mut self.trace.reference {
             (reference.values, reference.sd) = (moved, sd);

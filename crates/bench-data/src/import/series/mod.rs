@@ -7,15 +7,12 @@ mod values;
 use crate::import::error::ImportError;
 use crate::import::roles::is_coarse;
 use crate::import::table::Table;
-use crate::order::{median, typical_step};
+use crate::order::{LONGEST_GAP, median, typical_step};
 
 use digits::rounded_distinct;
 
 pub(crate) use times::Times;
 pub(crate) use values::{Values, check_positive, converted};
-
-/// Longest gap that is bridged, in typical steps, unless the values on both sides are equal.
-const LONGEST_GAP: f64 = 10.0;
 
 /// Largest time after a restart, as a share of the time since the recording's start.
 const RESTART: f64 = 0.1;
@@ -77,7 +74,7 @@ impl Series {
         Ok((series, untimed, repeated))
     }
 
-    /// Interpolates the known values linearly; NaN outside of them and in gaps.
+    /// Interpolates the known values linearly; NaN outside of them and in gaps, unless the values on both sides are equal.
     pub(crate) fn at(&self, times: &[f64]) -> Vec<f64> {
         let known: Vec<usize> = (0..self.time.len()).filter(|row| !self.value[*row].is_nan()).collect();
         let step = typical_step(&self.time).unwrap_or(0.0);

@@ -10,7 +10,7 @@ use thiserror::Error;
 
 use crate::CalibrationError;
 use crate::recording::screen::screen;
-use crate::samples::Samples;
+use crate::samples::{LONGEST_GAP, Samples, usual_step_s};
 use law::lag_by_law;
 use search::Search;
 
@@ -169,20 +169,19 @@ pub fn clock_lag(readings: (&[f64], &[f64]), reference: (&[f64], &[f64])) -> Res
     search.lag(best, readings, reference)
 }
 
-/// Returns the reference of each row, moved by `-lag_s`: its value that much later, interpolated; NaN beyond its ends.
+/// Returns the reference of each row, moved by `-lag_s`: its value that much later, interpolated; NaN beyond its ends and in gaps of more
+/// than ten of its usual steps.
 #[must_use]
 pub fn aligned(samples: &Samples, lag_s: f64) -> Vec<f64> {
-    let known: Vec<(f64, f64)> = samples
-        .time_s
-        .iter()
-        .zip(samples.strain)
-        .filter_map(|(&time_s, &strain)| strain.is_finite().then_some((time_s, strain)))
-        .collect();
+    let rows = samples.time_s.iter().zip(samples.strain).filter(|(_, strain)| strain.is_finite());
+    let (known_s, known): (Vec<f64>, Vec<f64>) = rows.unzip();
+    let longest_s = LONGEST_GAP * usual_step_s(std::iter::once(&known_s[..]));
     let at = |time_s: f64| {
-        let after = known.partition_point(|(known_s, _)| *known_s < time_s);
-        match (after.checked_sub(1).and_then(|before| known.get(before)), known.get(after)) {
-            (_, Some((b_s, b))) if *b_s == time_s => *b,
-            (Some((a_s, a)), Some((b_s, b))) => a + (time_s - a_s) / (b_s - a_s) * (b - a),
+        let after = known_s.partition_point(|known_s| *known_s < time_s);
+        let row = |row: usize| Some((*known_s.get(row)?, *known.get(row)?));
+        match (after.checked_sub(1).and_then(row), row(after)) {
+            (_, Some((b_s, b))) if b_s == time_s => b,
+            (Some((a_s, a)), Some((b_s, b))) if b_s - a_s <= longest_s => a + (time_s - a_s) / (b_s - a_s) * (b - a),
             _ => f64::NAN,
         }
     };

@@ -30,6 +30,12 @@ pub struct Piece {
 }
 
 impl Piece {
+    /// True if it contains a segment of this choice.
+    fn contains(&self, choice: SegmentChoice) -> bool {
+        let (one, phase) = (choice.to_string(), format!("{choice}:"));
+        self.label.split('+').any(|label| label == one || label.starts_with(&phase))
+    }
+
     /// Appends the readings of another piece.
     pub fn join(&mut self, other: Self) {
         self.label = format!("{},{}", self.label, other.label);
@@ -59,8 +65,10 @@ pub fn pieces(recording: &TraceFile, args: &FitLawArgs) -> Result<Vec<Piece>, Cl
     let segments = numbered(segment(samples.time_s(), samples.strain()));
     let cutter = Cutter { samples, segments: &segments };
     let chosen = if args.law == ClosedForm::Eq8And9 { cutter.pairs(args) } else { cutter.singles(args) };
-    if chosen.is_empty() {
-        return Err(CliError::Input(nothing(&recording.name, args, &segments)));
+    let is_missing = |choice: &&SegmentChoice| !chosen.iter().any(|piece| piece.contains(**choice));
+    let missing: Vec<&SegmentChoice> = args.segment.iter().filter(is_missing).collect();
+    if chosen.is_empty() || !missing.is_empty() {
+        return Err(CliError::Input(nothing(&recording.name, args, &missing, &segments)));
     }
     Ok(chosen)
 }
@@ -133,6 +141,11 @@ impl Numbered {
         })
     }
 
+    /// True if no gap in the reference lies between both.
+    fn follows(&self, before: &Self) -> bool {
+        self.segment.rows.start == before.segment.rows.end
+    }
+
     fn is_hold(&self) -> bool {
         self.segment.phase == Phase::Hold
     }
@@ -164,7 +177,7 @@ impl Cutter<'_> {
         let chosen = |own: &Numbered| args.segment.is_empty() || own.is_chosen(&args.segment);
         let mut out = Vec::new();
         for (i, own) in self.segments.iter().enumerate().filter(|(_, own)| !own.is_hold()) {
-            match self.segments.get(i + 1).filter(|next| next.is_hold()) {
+            match self.segments.get(i + 1).filter(|next| next.is_hold() && next.follows(own)) {
                 Some(hold) if chosen(own) || chosen(hold) => out.push(self.pair(i, hold)),
                 None if args.table && chosen(own) => out.push(self.single(i, ClosedForm::Eq8)),
                 _ => {}
@@ -206,11 +219,11 @@ impl Cutter<'_> {
 
     /// Returns the movement before a hold.
     fn before(&self, i: usize) -> Option<&Numbered> {
-        i.checked_sub(1).map(|before| &self.segments[before])
+        i.checked_sub(1).map(|before| &self.segments[before]).filter(|before| self.segments[i].follows(before))
     }
 }
 
-fn nothing(file: &str, args: &FitLawArgs, segments: &[Numbered]) -> String {
+fn nothing(file: &str, args: &FitLawArgs, missing: &[&SegmentChoice], segments: &[Numbered]) -> String {
     let wanted = if args.segment.is_empty() {
         match args.law {
             ClosedForm::Eq8And9 => "a movement followed by a hold".to_string(),
@@ -218,7 +231,9 @@ fn nothing(file: &str, args: &FitLawArgs, segments: &[Numbered]) -> String {
             _ => "a hold after a movement".into(),
         }
     } else {
-        let names: Vec<String> = args.segment.iter().map(ToString::to_string).collect();
+        let all = || args.segment.iter().collect();
+        let names: Vec<&SegmentChoice> = if missing.is_empty() { all() } else { missing.to_vec() };
+        let names: Vec<String> = names.iter().map(ToString::to_string).collect();
         format!("segments {}", names.join(", "))
     };
     let found = |phase: Phase| {
