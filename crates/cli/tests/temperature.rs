@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
-use crate::common::{Bench, Csv};
+use crate::common::{Bench, Csv, change_rows};
 use crate::export::{compile_and_run, compilers};
 
 /// Returns a folder with a sensor of the fastest estimator, calibrated in a climate chamber, and its recording with and without the column
@@ -105,6 +105,26 @@ fn coefficients_can_be_given_and_are_checked() {
         "{}",
         run.stderr
     );
+}
+
+#[test]
+fn scores_do_not_depend_on_implausible_temperatures() {
+    let bench = chamber();
+    for (name, cell) in [("unplugged.csv", "-127"), ("missing.csv", "")] {
+        let changed = change_rows(&bench.read("trace.csv"), |row, cells| {
+            if row % 400 > 300 {
+                *cells.last_mut().unwrap() = cell.to_owned();
+            }
+        });
+        bench.write(name, changed);
+    }
+    let scores = |name: &str| {
+        let run = bench.run(&["evaluate", name, "--sensor", "sensor.toml", "--json"]);
+        let json: serde_json::Value = serde_json::from_str(&run.stdout).unwrap();
+        ["rmse", "coverage_95", "smoother"].map(|name| json["recordings"][0][name].clone())
+    };
+    assert!(scores("missing.csv")[0].is_number());
+    assert_eq!(scores("unplugged.csv"), scores("missing.csv"));
 }
 
 /// The first rows after the interruption have no temperature: the last one of the earlier stream applies.

@@ -9,7 +9,7 @@ use ohmstrain_sensor::{
 use crate::column::Header;
 use crate::estimate::check_rest;
 use crate::text;
-use crate::{Column, Error, Estimate, FilterBuilder, UnitDoubt};
+use crate::{Column, Error, Estimate, FilterBuilder, Thermometer, UnitDoubt};
 
 /// A calibrated, checked sensor: every number is in its range, and a filter can be built from it.
 ///
@@ -213,7 +213,7 @@ impl Sensor {
     }
 
     /// Returns a column of readings as they would be at the reference temperature; as they are without an effect of temperature. A
-    /// missing temperature, °C, is that of the row before.
+    /// missing temperature, °C, is that of the row before; an [implausible](Thermometer::implausible) one counts as missing.
     ///
     /// ```
     /// # let text = std::fs::read_to_string("examples/sensor.toml")?;
@@ -223,10 +223,8 @@ impl Sensor {
     /// ```
     #[must_use]
     pub fn at_reference_temperature(&self, readings: &[f64], temperature_c: &[f64]) -> Vec<f64> {
-        match &self.params.temperature {
-            None => readings.to_vec(),
-            Some(effect) => effect.column_at_reference(self.params.rest_reading, readings, temperature_c),
-        }
+        let mut thermometer = Thermometer::new(self);
+        readings.iter().zip(temperature_c).map(|(reading, value)| thermometer.at_reference(*reading, *value)).collect()
     }
 
     /// Checks that the rested sensor can read `measured`.
