@@ -187,6 +187,8 @@ fn a_reference_without_information_is_refused() {
     bench.write("bad.csv", change_rows(&trace, |_, cells| cells[2] = "0.1".into()));
     let constant = "bad.csv: the reference is constant: nothing can be learned from it";
     fails(&bench, calibrate, CONTENT, constant);
+    let unchanged = "bad.csv: expected a reference that changes, found 0.1 in every row that is scored";
+    fails(&bench, evaluate, CONTENT, unchanged);
 
     bench.write("bad.csv", change_rows(&trace, |_, cells| cells[2] = "NaN".into()));
     let none = "bad.csv: recording 1 has 0 rows with reading and reference, at least 60 are needed";

@@ -80,6 +80,12 @@ fn a_hand_is_smoothed_and_scored_joint_by_joint() {
         let found = &scored["joints"][place];
         assert_eq!((&found["fused"]["rmse"], &found["smoothed"]["rmse"]), rmse_of(&one), "{joint}");
     }
+    let evaluate = ["evaluate", "pair.csv", "pair.csv", "--sensor", "pair.toml"];
+    let several: serde_json::Value =
+        serde_json::from_str(&bench.run(&[&evaluate[..], &["--json"]].concat()).ok()).unwrap();
+    assert!((0..2).all(|place| several["recordings"][place]["joints"] == scored["joints"]), "{several}");
+    let late = bench.run(&[&evaluate[..], &["--from", "9999"]].concat());
+    late.fails(4, "pair.csv: no row is left by --from 9999; the recording goes from 0 to 400 s");
     for (flags, refused) in [
         (["--estimator", "ekf"], "--estimator is for one sensor"),
         (["--rest-resistance", "1600"], "--rest-resistance is for one sensor"),

@@ -159,7 +159,7 @@ fn run_command(command: Command, draft: &Path, entry: &mut Entry, messages: &Mes
                 entry.figures = scores.first().map(Figures::of_joint).unwrap_or_default();
                 entry.rows = entry.figures.rows;
                 let mut text = Vec::new();
-                hand::scores::write(&mut text, name, scores, args.json)?;
+                hand::scores::write(&mut text, name, &scores, args.json)?;
                 fs::write(draft, text).map_err(|error| CliError::file("write", draft, &error))
             })?;
         }

@@ -37,8 +37,15 @@ const LEAST_COVERAGE: f64 = 0.8;
 /// Compares estimates with the reference of each recording.
 pub fn run(args: &EvaluateArgs, messages: &Messages) -> Result<(), CliError> {
     if let Some(hand) = args.calibration.sensor.as_ref().filter(|path| sensor_file::is_of_a_hand(path)) {
-        let show = |name: &str, scores: &[JointScores]| print(|out| joint_scores::write(out, name, scores, args.json));
-        return hand::evaluate::run(args, hand, show);
+        let mut scored: Vec<(String, Vec<JointScores>)> = Vec::new();
+        let judged = hand::evaluate::run(args, hand, |name, scores| {
+            scored.push((name.to_owned(), scores));
+            Ok(())
+        });
+        if !scored.is_empty() {
+            print(|out| joint_scores::write_all(out, &scored, args.json))?;
+        }
+        return judged;
     }
     evaluate(args, messages, &mut Evaluation::default(), |evaluation| print(|out| evaluation.write(out, args.json)))
 }
@@ -219,14 +226,8 @@ fn judge(
     let rest = rest_resistance(args.rest_resistance, first, readings(), &recording.name)?;
     suits::check_readings(&recording.header, first, rest, readings())?;
     suits::check_reference(recording, first)?;
-    let last_s = recording.trace.time_s.last().copied();
-    if part.until_s.is_none() && part.from_s.zip(last_s).is_some_and(|(from_s, last_s)| from_s > last_s) {
-        return Err(recording.no_rows(part.from_s, None).into());
-    }
-    let nothing = || {
-        let rows = part.from_s.map_or_else(|| "any row".into(), |from| format!("time_s >= {from}"));
-        CliError::Input(format!("{}: expected a reference at {rows}, found none", recording.name))
-    };
+    check_truth(recording, part)?;
+    let nothing = || no_truth(recording, part);
     let moved = first.params().rest_reading / first.rest_reading(rest);
     let baselines = rivals.scores(recording, part, moved).ok_or_else(nothing)?;
     let has_split = !args.calibration.split.is_empty();
@@ -249,6 +250,28 @@ fn judge(
         judged.drawn = Some(drawn(&reporting)?);
     }
     Ok(judged)
+}
+
+/// Refuses a recording without rows in `part`, or whose reference is unknown or constant in them.
+pub fn check_truth(recording: &TraceFile, part: Scored) -> Result<(), CliError> {
+    let last_s = recording.trace.time_s.last().copied();
+    if part.until_s.is_none() && part.from_s.zip(last_s).is_some_and(|(from_s, last_s)| from_s > last_s) {
+        return Err(recording.no_rows(part.from_s, None).into());
+    }
+    let rows = recording.trace.time_s.iter().enumerate().filter(|(_, time_s)| part.holds(**time_s));
+    let mut known = rows.map(|(row, _)| recording.truth(row)).filter(|truth| truth.is_finite());
+    let first = known.next().ok_or_else(|| no_truth(recording, part))?;
+    if known.all(|truth| truth == first) {
+        let name = &recording.name;
+        let text = format!("{name}: expected a reference that changes, found {first} in every row that is scored");
+        return Err(CliError::Input(text));
+    }
+    Ok(())
+}
+
+fn no_truth(recording: &TraceFile, part: Scored) -> CliError {
+    let rows = part.from_s.map_or_else(|| "any row".into(), |from| format!("time_s >= {from}"));
+    CliError::Input(format!("{}: expected a reference at {rows}, found none", recording.name))
 }
 
 fn check(evaluation: &Evaluation) -> Result<(), CliError> {

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use ohmstrain::trace::{HAND_FORMAT, HandChannel, TraceFile, check_alike, known_recordings};
 use ohmstrain::{Calibrated, Fused, MADE_BY, Recording, fuse};
 use ohmstrain_calib::Samples;
+use ohmstrain_report::Sample;
 use serde::Serialize;
 
 use super::refuse_flags;
@@ -178,7 +179,8 @@ impl Group {
         let Some((path, claim)) = files.fusion else {
             let findings = calibrated.first().and_then(|one| one.findings.as_ref());
             let (alone, smoothed) = (findings.map(|found| found.filter), findings.and_then(|found| found.smoother));
-            let scores = JointScores { joint: name.clone(), fused: alone, smoothed, channels: Vec::new() };
+            let scores =
+                JointScores { joint: name.clone(), sample: Sample::Out, fused: alone, smoothed, channels: Vec::new() };
             return Ok((WrittenJoint { name, only: entries.pop(), fusion: None, channels: Vec::new() }, scores));
         };
         let fused = fused(&recordings, &calibrated)?;
@@ -188,7 +190,13 @@ impl Group {
             .zip(fused.channels)
             .map(|(column, alone)| ChannelScores { column, alone, smoothed: None })
             .collect();
-        let scores = JointScores { joint: name.clone(), fused: fused.scores, smoothed: fused.smoothed, channels };
+        let scores = JointScores {
+            joint: name.clone(),
+            sample: Sample::Out,
+            fused: fused.scores,
+            smoothed: fused.smoothed,
+            channels,
+        };
         Ok((WrittenJoint { name, only: None, fusion: Some(path), channels: entries }, scores))
     }
 

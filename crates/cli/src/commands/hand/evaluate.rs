@@ -1,6 +1,6 @@
 //! Scores of a hand's estimates against the references of a recording of all its channels.
 
-use ohmstrain_report::{Scored, scoring};
+use ohmstrain_report::{Sample, Scored, scoring};
 use std::path::Path;
 
 use ohmstrain::trace::{HandChannel, TraceFile};
@@ -13,13 +13,14 @@ use super::scores::{ChannelScores, JointScores};
 use super::{OF_ONE_SENSOR, joints, refuse_flags};
 use crate::args::{Estimators, EvaluateArgs};
 use crate::channels::{self, Table};
+use crate::commands::evaluate::check_truth;
 use crate::error::CliError;
 
 /// Scores every recording with the joints of a description, and passes its name and the scores to `show`.
 pub fn run(
     args: &EvaluateArgs,
     hand: &Path,
-    mut show: impl FnMut(&str, &[JointScores]) -> Result<(), CliError>,
+    mut show: impl FnMut(&str, Vec<JointScores>) -> Result<(), CliError>,
 ) -> Result<(), CliError> {
     refuse_flags(
         [
@@ -44,7 +45,7 @@ pub fn run(
         for joint in joints(&description, hand, &name)? {
             scores.push(scored(joint, &table, &args.units.metadata(), Scored::since(args.from))?);
         }
-        show(&name, &scores)?;
+        show(&name, scores)?;
     }
     Ok(())
 }
@@ -65,7 +66,12 @@ pub fn scored(mut joint: Joint, table: &Table, overrides: &Metadata, part: Score
         Ok(trace)
     };
     let traces: Vec<TraceFile> = joint.channels.iter().map(|channel| trace(channel.entry)).collect::<Result<_, _>>()?;
-    let time_s = traces.first().map_or_else(Vec::new, |trace| trace.trace.time_s.clone());
+    let Some((first, channel)) = traces.first().zip(joint.channels.first()) else {
+        return Err(CliError::Input(format!("joint `{}`: expected a channel, found none", joint.name)));
+    };
+    check_truth(first, part)?;
+    let time_s = first.trace.time_s.clone();
+    let sample = Sample::of(&time_s, &first.sha256, channel.sensor.params(), part);
     let readings: Vec<Vec<Reading>> =
         traces.iter().map(|trace| (0..time_s.len()).map(|row| trace.reading(row).1).collect()).collect();
     let step = |row: usize| {
@@ -82,7 +88,7 @@ pub fn scored(mut joint: Joint, table: &Table, overrides: &Metadata, part: Score
             let (strain, sd) = of(&rows[row]);
             (strain, Some(sd))
         };
-        if rows.is_empty() { None } else { scoring::scores(&traces[0], part, estimate) }
+        if rows.is_empty() { None } else { scoring::scores(first, part, estimate) }
     };
     let of_joint = |row: &JointRow| (row.strain, row.strain_sd);
     let of_channel = |(k, channel): (usize, &Channel)| {
@@ -92,5 +98,5 @@ pub fn scored(mut joint: Joint, table: &Table, overrides: &Metadata, part: Score
     };
     let channels = joint.channels.iter().enumerate().map(of_channel).collect();
     let (fused, smoothed) = (score(&filtered, &of_joint), score(&smoothed, &of_joint));
-    Ok(JointScores { joint: joint.name.into(), fused, smoothed, channels })
+    Ok(JointScores { joint: joint.name.into(), sample, fused, smoothed, channels })
 }

@@ -1,6 +1,7 @@
 use std::io::Write;
 
 use ohmstrain::Scores;
+use ohmstrain_report::Sample;
 use serde::Serialize;
 
 use crate::commands::score_table::{KEY, add_scores, score_table};
@@ -12,6 +13,9 @@ use crate::output;
 pub struct JointScores {
     /// Name of the joint.
     pub joint: String,
+    /// Overlap of the scored rows with the calibration of the first channel.
+    #[serde(skip)]
+    pub sample: Sample,
     /// Scores of the joint's estimate as `hand` reports it.
     pub fused: Option<Scores>,
     /// Scores of the smoothed estimate; `None` without a smoother.
@@ -38,8 +42,10 @@ pub fn write(out: &mut dyn Write, heading: &str, joints: &[JointScores], is_json
     if is_json {
         return output::json(out, SCHEMA, &serde_json::json!({ "scored": heading, "joints": joints }));
     }
+    let seen = joints.iter().map(|joint| joint.sample).find(|sample| *sample != Sample::Out);
+    let sample = seen.map_or_else(String::new, |sample| format!(": {}", sample.name()));
     let mut table = score_table();
-    for JointScores { joint, fused, smoothed, channels } in joints {
+    for JointScores { joint, fused, smoothed, channels, .. } in joints {
         fused.iter().for_each(|scores| add_scores(&mut table, joint, scores));
         smoothed.iter().for_each(|scores| add_scores(&mut table, &format!("{joint}, smoothed"), scores));
         let alone = channels.iter().filter(|_| channels.len() > 1);
@@ -48,5 +54,16 @@ pub fn write(out: &mut dyn Write, heading: &str, joints: &[JointScores], is_json
             smoothed.iter().for_each(|scores| add_scores(&mut table, &format!("  {column} alone, smoothed"), scores));
         }
     }
-    Ok(writeln!(out, "{heading}\n\n{table}\n\n{KEY}")?)
+    Ok(writeln!(out, "{heading}{sample}\n\n{table}\n\n{KEY}")?)
+}
+
+/// Prints the scores of recordings with their names: as one JSON document, or as a table each.
+pub fn write_all(out: &mut dyn Write, scored: &[(String, Vec<JointScores>)], is_json: bool) -> Result<(), CliError> {
+    if is_json && scored.len() > 1 {
+        let of_one =
+            |(name, joints): &(String, Vec<JointScores>)| serde_json::json!({ "scored": name, "joints": joints });
+        let recordings: Vec<_> = scored.iter().map(of_one).collect();
+        return output::json(out, SCHEMA, &serde_json::json!({ "recordings": recordings }));
+    }
+    scored.iter().try_for_each(|(name, joints)| write(out, name, joints, is_json))
 }
