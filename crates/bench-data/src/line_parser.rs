@@ -70,7 +70,7 @@ impl LineParser {
     /// are those of rows.
     #[must_use]
     pub fn metadata(&self) -> Metadata {
-        self.stream.as_ref().map_or_else(|| self.above(), |stream| stream.metadata.clone()).in_own_units()
+        self.stream.as_ref().map_or_else(|| self.above(), |stream| stream.metadata.clone()).in_own_units(true)
     }
 
     /// Returns the metadata for a header that arrives now; one without lines above it keeps the metadata of the previous header.

@@ -109,10 +109,11 @@ impl Metadata {
     /// Key of the clock's unit. Only its value `s` has a meaning.
     pub const TIME_UNIT: &str = "time_unit";
 
-    /// Returns the metadata with the units of numbers after reading, if a file states units.
-    pub(crate) fn in_own_units(&self) -> Self {
+    /// Returns the metadata with the units of numbers after reading, if a file states units. Without a column `strain` that
+    /// of strains is kept, for marks.
+    pub(crate) fn in_own_units(&self, has_strain: bool) -> Self {
         Self {
-            strain_unit: self.strain_unit.map(|_| StrainUnit::Fraction),
+            strain_unit: self.strain_unit.map(|unit| if has_strain { StrainUnit::Fraction } else { unit }),
             resistance_unit: self.resistance_unit.map(|_| ResistanceUnit::Ohm),
             ..self.clone()
         }

@@ -1,7 +1,7 @@
 use std::io::Read;
 
 use crate::clock::LastTime;
-use crate::columns::Columns;
+use crate::columns::{Column, Columns};
 use crate::error::{Fault, TraceError};
 use crate::lines::{LineFault, LineFeed, Lines, is_plain};
 use crate::metadata::Metadata;
@@ -76,8 +76,9 @@ impl<R: Read> TraceReader<R> {
         records.read_record(&mut record).map_err(|error| feed_error(error, &mut records, &file))?;
         let at_header = |fault: Fault| TraceError::from(fault.at(&file, records.get_ref().line()));
         let columns = Columns::of_header(&record).map_err(at_header)?;
+        let has_strain = columns.reference.is_some_and(|place| place.column == Column::Strain);
         let parser = RowParser::new(columns, &metadata).map_err(at_header)?;
-        let metadata = metadata.in_own_units();
+        let metadata = metadata.in_own_units(has_strain);
         Ok(Self { file, metadata, parser, records, record, plain, done: false })
     }
 

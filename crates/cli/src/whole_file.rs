@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
+use csv::StringRecord;
 use ohmstrain_bench_data::import::LARGEST_FILE;
 
 use crate::error::CliError;
@@ -29,6 +30,14 @@ pub fn text(path: &Path) -> Result<String, CliError> {
         let name = path.display();
         CliError::Input(format!("{name}:1: expected a text file in UTF-8, found other bytes"))
     })
+}
+
+/// Returns the line of a record of a CSV file. Its position is that of the line ends before it, which are skipped.
+pub fn line(text: &str, row: &StringRecord) -> u64 {
+    let Some(position) = row.position() else { return 0 };
+    let rest = usize::try_from(position.byte()).ok().and_then(|byte| text.get(byte..)).unwrap_or_default();
+    let ends = rest.chars().take_while(|end| ['\r', '\n'].contains(end));
+    position.line() + ends.filter(|end| *end == '\n').count() as u64
 }
 
 fn up_to(most: u64, path: &Path, hint: &str) -> Result<Vec<u8>, CliError> {

@@ -258,6 +258,7 @@ fn a_sensor_file_that_is_none_is_refused_alike_by_every_command() {
     let limits = swap(&sensor, "upper = ", "upper = -1.0");
     let tau = swap(&sensor, "tau_s = ", "tau_s = -2.0");
     let family = swap(&sensor, "family = \"polynomial\"", "family = \"spline\"");
+    let angle = swap(&sensor, "quantity = ", "quantity = \"angle_deg\"");
     let line_of = |start: &str| sensor.lines().position(|line| line.starts_with(start)).unwrap();
     let joint = "[joint]\nprestrain = 0.0\nmoment_arm_mm = 0.0\ngauge_length_mm = 30.0\n\n[law]";
     let cases: Vec<(Vec<u8>, String)> = vec![
@@ -291,6 +292,10 @@ fn a_sensor_file_that_is_none_is_refused_alike_by_every_command() {
         (
             sensor.replace("[law]", joint).into(),
             format!(":{}: column 17: field `joint.moment_arm_mm`: expected a length", 3 + line_of("[law]")),
+        ),
+        (
+            angle.0.replace("[law]", &joint.replace("= 0.0\ng", "= 9.0\ng")).into(),
+            format!(":{}: column 12: field `quantity`: expected `strain` beside `[joint]`, found angle_deg", angle.1),
         ),
         (trace.into(), " is a recording, not a sensor file: give --sensor what ".into()),
         ("hello there\n".into(), ":1: column 7: key with no value, expected `=`".into()),

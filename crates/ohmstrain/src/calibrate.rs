@@ -4,7 +4,7 @@ use ohmstrain_calib::{
     CalibrationError, Confounded, Distrusted, GaugeFamily, LawOptions, LeftOutRow, RECIPE, Samples, Stage,
     TemperatureCoefficients, TemperatureFit, fit_temperature,
 };
-use ohmstrain_sensor::{EstimatorKind, Findings, RecordingInfo, SensorParams};
+use ohmstrain_sensor::{EstimatorKind, Findings, Quantity, RecordingInfo, SensorParams};
 
 use crate::{Error, MADE_BY, Prior, Recording, Sensor};
 
@@ -211,7 +211,8 @@ impl<'a> Calibration<'a> {
             Some(RecordingInfo { file, sha256, rows, first_s, last_s, rest_reading: *rest_reading })
         };
         let infos = recordings.iter().zip(&rest_readings).filter_map(info).collect();
-        let joint = recordings.iter().find_map(|recording| recording.joint);
+        let of_strain = |recording: &Recording| recording.joint.filter(|_| recording.quantity == Quantity::Strain);
+        let joint = recordings.iter().find_map(of_strain);
         let params = calibration.into_sensor(MADE_BY, quantity, reading);
         let findings = params.findings.clone();
         let (effect, confounded_temperature) =

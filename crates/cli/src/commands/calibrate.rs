@@ -75,7 +75,13 @@ pub fn calibrate(args: &CalibrateArgs, messages: &Messages) -> Result<Outcome, C
             kept.push((recordings.len() - 1, recording, rows));
         }
     }
-    let marked = marks::of_recordings(&recordings, &args.marks)?;
+    let mut marked = marks::of_recordings(&mut recordings, &args.marks, overrides.strain_unit)?;
+    if !args.marks.is_empty() {
+        // Marks stand in place of a reference: nothing is known of the other rows.
+        for (place, whole, _) in kept.drain(..) {
+            marks::within(&mut marked[place], &recordings[place], &whole, messages);
+        }
+    }
     let mut lags_s = vec![0.0; recordings.len()];
     for (place, recording) in recordings.iter_mut().enumerate() {
         if marked.iter().all(|one| one.recording != place) {

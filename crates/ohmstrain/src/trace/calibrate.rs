@@ -103,6 +103,9 @@ fn refuse_or_warn(
     for doubt in doubts {
         let names = match &doubt.recordings()[..] {
             [] => String::new(),
+            [one] if matches!(doubt, CalibrationDoubt::Percent { .. }) => {
+                format!("{}: ", recordings[*one].reference_header)
+            }
             [one] => format!("{}: ", recordings[*one].header),
             several => several.iter().map(name).collect::<Vec<_>>().join(" and ") + ": ",
         };

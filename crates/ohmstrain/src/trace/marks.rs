@@ -1,5 +1,5 @@
 use ohmstrain_bench_data::pacing::{PERSON_SD_S, probable_hold};
-use ohmstrain_bench_data::{Reference, ReferenceQuantity};
+use ohmstrain_bench_data::{Metadata, Reference, ReferenceQuantity, StrainUnit};
 use ohmstrain_calib::{Mark, MarkedReference, MarksError};
 
 use super::TraceFile;
@@ -13,6 +13,8 @@ pub struct Marked {
     pub recording: usize,
     /// Name of the file that contains the marks.
     pub name: String,
+    /// Name of their header in messages: file and line.
+    pub header: String,
     /// Quantity of the marks' strains.
     pub quantity: ReferenceQuantity,
     /// The marks, in order of time.
@@ -26,7 +28,34 @@ impl Marked {
     #[must_use]
     pub fn of_trace(recording: usize, file: &TraceFile) -> Option<Self> {
         let quantity = file.trace.reference.as_ref()?.quantity;
-        Some(Self { recording, name: file.name.clone(), quantity, marks: file.marks()?, lines: Vec::new() })
+        let (name, header) = (file.name.clone(), file.header.clone());
+        Some(Self { recording, name, header, quantity, marks: file.marks()?, lines: Vec::new() })
+    }
+
+    /// Converts the marks of a file to those of a recording with these metadata, as a reference in the recording itself is
+    /// converted: strains by `unit`, and angles by a joint.
+    ///
+    /// # Errors
+    /// If the joint is invalid.
+    pub fn of_recording(mut self, metadata: &Metadata, unit: Option<StrainUnit>) -> Result<Self, Error> {
+        match (self.quantity, metadata.joint) {
+            (ReferenceQuantity::Strain, _) => self.convert(|strain| unit.map_or(1.0, StrainUnit::factor) * strain),
+            (ReferenceQuantity::AngleDeg, Some(joint)) => {
+                let joint = joint.build().map_err(Error::Joint)?;
+                self.convert(|angle_deg| joint.strain(angle_deg.to_radians()));
+                self.quantity = ReferenceQuantity::Strain;
+            }
+            (ReferenceQuantity::AngleDeg, None) => {}
+        }
+        Ok(self)
+    }
+
+    /// Converts the strains of all marks by a linear function.
+    fn convert(&mut self, to: impl Fn(f64) -> f64) {
+        for mark in &mut self.marks {
+            mark.strain_sd = mark.strain_sd.map(|sd| (to(sd) - to(0.0)).abs());
+            mark.strain = to(mark.strain);
+        }
     }
 
     /// Formats a fault with the file and the line, or the mark, that it concerns.
@@ -110,7 +139,9 @@ pub fn take_marks(recordings: &mut [TraceFile], marked: &[Marked]) -> Result<Vec
     let found = marked_references(&known, &marks)?;
     for (one, found) in marked.iter().zip(&found) {
         let (values, sd) = (found.strain.clone(), found.strain_sd.clone());
-        recordings[one.recording].trace.reference = Some(Reference { quantity: one.quantity, values, sd });
+        let recording = &mut recordings[one.recording];
+        recording.reference_header.clone_from(&one.header);
+        recording.trace.reference = Some(Reference { quantity: one.quantity, values, sd });
     }
     Ok(found)
 }
@@ -118,7 +149,7 @@ pub fn take_marks(recordings: &mut [TraceFile], marked: &[Marked]) -> Result<Vec
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ohmstrain_bench_data::{Metadata, TraceReader};
+    use ohmstrain_bench_data::TraceReader;
 
     fn marks(rows: &str) -> Option<Vec<Mark>> {
         let text = format!("time_s,resistance_ohm,strain,strain_sd\n{rows}");
@@ -133,6 +164,29 @@ mod tests {
         let rest = Mark { until_s, strain_sd: Some(0.01), time_sd_s, ..Mark::new(0.0, 0.0) };
         let moment = Mark { strain_sd: Some(0.02), ..Mark::new(3.0, 0.2) };
         assert_eq!(found, [rest, moment]);
+    }
+
+    /// As a column `strain` or `angle_deg`: 5 ± 1 %, and 90 ± 1.8° around an axis 10 mm away, of a sensor of 50 mm.
+    #[test]
+    fn marks_are_converted_as_a_reference_is() {
+        let converted = |quantity, (value, sd), joint: Option<&str>, unit| {
+            let marks = vec![Mark { strain_sd: Some(sd), ..Mark::new(0.0, value) }];
+            let (name, header) = (String::new(), String::new());
+            let metadata = Metadata { joint: joint.map(|joint| joint.parse().unwrap()), ..Metadata::default() };
+            let marked = Marked { recording: 0, name, header, quantity, marks, lines: Vec::new() };
+            let found = marked.of_recording(&metadata, unit).unwrap();
+            (found.quantity, found.marks[0].strain, found.marks[0].strain_sd.unwrap())
+        };
+        let near = |(quantity, value, sd): (ReferenceQuantity, f64, f64), expected: (ReferenceQuantity, f64, f64)| {
+            let is_near = (value - expected.1).abs() < 1e-12 && (sd - expected.2).abs() < 1e-12;
+            assert!(quantity == expected.0 && is_near, "{quantity:?} {value} {sd}");
+        };
+        let (strain, angle) = (ReferenceQuantity::Strain, ReferenceQuantity::AngleDeg);
+        let (knee, turn) = (Some("prestrain=0.05 moment_arm_mm=-10 gauge_length_mm=50"), std::f64::consts::FRAC_PI_2);
+        near(converted(strain, (5.0, 1.0), knee, Some(StrainUnit::Percent)), (strain, 0.05, 0.01));
+        near(converted(strain, (0.05, 0.01), None, None), (strain, 0.05, 0.01));
+        near(converted(angle, (90.0, 1.8), None, Some(StrainUnit::Percent)), (angle, 90.0, 1.8));
+        near(converted(angle, (90.0, 1.8), knee, None), (strain, 0.05 - 0.2 * turn, 0.004 * turn));
     }
 
     #[test]

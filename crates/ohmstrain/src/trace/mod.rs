@@ -32,6 +32,8 @@ pub struct TraceFile {
     pub name: String,
     /// Name of its header in messages: file and line.
     pub header: String,
+    /// Name of the header of its reference: its own, or that of a file of marks.
+    pub reference_header: String,
     /// SHA-256 of its bytes, hexadecimal.
     pub sha256: String,
     /// Number of rows of the file before the first one here.
@@ -100,7 +102,8 @@ impl TraceFile {
     /// The first row that cannot be read.
     pub fn collect<R: Read>(rows: TraceReader<R>, sha256: String) -> Result<Self, TraceError> {
         let (name, header) = (rows.file().to_owned(), header(rows.file(), rows.line()));
-        Ok(Self { name, header, sha256, first_row: 0, trace: Trace::collect(rows)? })
+        let reference_header = header.clone();
+        Ok(Self { name, header, reference_header, sha256, first_row: 0, trace: Trace::collect(rows)? })
     }
 
     /// Returns some of its rows, under the same name.
@@ -109,6 +112,7 @@ impl TraceFile {
         Self {
             name: self.name.clone(),
             header: self.header.clone(),
+            reference_header: self.reference_header.clone(),
             sha256: self.sha256.clone(),
             first_row: self.first_row + rows.start,
             trace: self.trace.rows(rows),
@@ -143,13 +147,13 @@ impl TraceFile {
     /// If there is no reference, or a row is invalid.
     pub fn move_reference(&mut self, lag_s: f64) -> Result<(), TraceFileError> {
         let samples = self.samples()?;
+        if lag_s == 0.0 {
+            return Ok(());
+        }
         let moved = aligned(&samples, lag_s);
         let (time_s, reading, sd) = (samples.time_s(), samples.reading(), self.reference_sd());
         let named = |error| TraceFileError::Samples { name: self.name.clone(), error };
         let of_sd = (!sd.is_empty()).then(|| Samples::new(time_s, reading, sd)).transpose().map_err(named)?;
-        if lag_s == 0.0 {
-            return Ok(());
-        }
         let sd = of_sd.map(|of_sd| aligned(&of_sd, lag_s)).unwrap_or_default();
         if let Some(reference) = &mut self.trace.reference {
             (reference.values, reference.sd) = (moved, sd);

@@ -19,7 +19,7 @@ use crate::params::static_cubic::StaticCubic;
 use crate::params::summary::{Summary, TestedSummary};
 use crate::params::temperature::TemperatureParams;
 use crate::params::unstated::Unstated;
-use crate::params::{JointParams, RecordingInfo, Resolution, SensorParams, Sessions, Uncertainty, Validity};
+use crate::params::{JointParams, Quantity, RecordingInfo, Resolution, SensorParams, Sessions, Uncertainty, Validity};
 
 /// Shortest range of strains, relative to its larger end.
 const SHORTEST_RANGE: f64 = 1e-9;
@@ -53,6 +53,9 @@ impl SensorParams {
         self.temperature.map_or(Ok(()), |temperature| temperature.validate(&root.table("temperature")))?;
         self.static_cubic.validate(&root.table("static_cubic"))?;
         self.joint.as_ref().map_or(Ok(()), |joint| joint.validate(&root.table("joint")))?;
+        if self.joint.is_some() && self.quantity == Quantity::AngleDeg {
+            return Err(root.wrong("quantity", "`strain` beside `[joint]`", Quantity::AngleDeg.name()));
+        }
         self.law.validate(&root.table("law"))?;
         for (kind, estimator) in &self.estimators {
             estimator.validate(&root.table("estimators").table(kind.name()), self.limits)?;

@@ -211,7 +211,7 @@ impl Group {
         let mut recordings = Vec::new();
         for channel in &self.channels {
             let mut traces = self.traces(args, tables, channel)?;
-            let marked = marks::of_recordings(&traces, &[])?;
+            let marked = marks::of_recordings(&mut traces, &[], None)?;
             let name = format!("channel `{}`", channel.column);
             for remark in marks::take(&mut traces, &marked).map_err(|error| error.named(&name))? {
                 messages.remark(&format!("{name}: {remark}"));
