@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::common::Bench;
+use crate::common::{Bench, Csv};
 
 /// Returns a folder with recordings of the same readings at other times, a sensor, and two files that are not recordings.
 fn folder() -> Bench {
@@ -105,6 +105,15 @@ fn what_is_done_is_done_once() {
     assert_eq!(states(&[&smooth[..], &["--", "--without", "correction"]].concat()), "done done done");
     bench.write("sensor.toml", bench.read("sensor.toml") + "\n");
     assert_eq!(states(&[&smooth[..], &["--", "--without", "correction"]].concat()), "done done done");
+    assert_eq!(states(&[&smooth[..], &["--again", "--", "--without", "correction"]].concat()), "done done done");
+    // A sensor among the flags of the command.
+    let flagged: Vec<&str> =
+        smooth.iter().copied().filter(|word| !["--sensor", "sensor.toml"].contains(word)).collect();
+    let flagged = [&flagged[..], &["--", "--sensor", "sensor.toml"]].concat();
+    assert_eq!(states(&flagged), "done done done");
+    assert_eq!(states(&flagged), "kept kept kept");
+    bench.write("sensor.toml", bench.read("sensor.toml") + "\n");
+    assert_eq!(states(&flagged), "done done done");
     assert_eq!(states(&[&smooth[..], &["--again", "--", "--without", "correction"]].concat()), "done done done");
     // A line left unfinished by a killed run.
     let journal = bench.read("out/batch.jsonl");
@@ -226,6 +235,91 @@ fn recordings_of_one_sensor_are_calibrated_together_and_evaluated() {
     let single = bench.run(&["evaluate", "in/b.csv", "--sensor", "out/left.toml", "--json"]).ok();
     assert_eq!(bench.read("scores/b.json"), single);
     assert!(fs::read(bench.path("scores/summary.parquet")).unwrap().ends_with(b"PAR1"));
+}
+
+/// Rows of one sensor have a file of marks each, whose paths start at the manifest's folder, and share all other flags.
+#[test]
+fn rows_of_one_sensor_share_flags_and_have_their_own_marks() {
+    let bench = folder();
+    let trace = bench.read("in/b.csv");
+    let readings = trace.lines().filter(|line| !line.starts_with('#')).map(|line| line.rsplit_once(',').unwrap().0);
+    bench.write("in/b.csv", readings.map(|line| format!("{line}\n")).collect::<String>());
+    bench.write("in/marks.csv", "time_s,strain\n0,0\n5,0.1\n");
+    bench.write("in/late.csv", "time_s,strain\n0,0\n5e6,0.1\n");
+    let run = |manifest: &str| {
+        bench.write("in/manifest.csv", manifest);
+        bench.run(&["-q", "batch", "calibrate", "--manifest", "in/manifest.csv", "-o", "out"])
+    };
+    let other = run("file,sensor,estimator\r\na.csv,two,ekf\r\n\r\nday 2/a.csv,two,ukf\r\n");
+    let expected = "in/manifest.csv:4: expected the flags of the first row of its sensor, `--estimator ekf`, found `--estimator ukf`";
+    other.fails(4, expected);
+    let marked = run("file,sensor,estimator,marks\na.csv,one,ekf,marks.csv\nb.csv,one,ekf,late.csv\n");
+    assert!(
+        marked.code == Some(5) && marked.stderr.contains("in/late.csv:3: expected a time between"),
+        "{}",
+        marked.stderr
+    );
+}
+
+#[test]
+fn calibrations_with_other_marks_are_done_again() {
+    let bench = folder();
+    bench.write("marks.csv", "time_s,strain\n0,0\n1,x\n");
+    let batch =
+        ["-q", "batch", "calibrate", "in/a.csv", "-o", "out", "--summary", "json", "--", "--marks", "marks.csv"];
+    let flags = ["--estimator", "ekf", "--branches", "0"];
+    let trace = Csv::new(&bench.read("in/a.csv"));
+    let (time_s, strain) = (trace.numbers("time_s"), trace.numbers("strain"));
+    for (every, state) in [(20, "done"), (20, "kept"), (25, "done")] {
+        let marks = (0..time_s.len()).step_by(every).map(|k| format!("{},{}\n", time_s[k], strain[k]));
+        bench.write("marks.csv", format!("time_s,strain\n{}", marks.collect::<String>()));
+        bench.run(&[&batch[..], &flags].concat()).ok();
+        assert_eq!(summary(&bench)[0]["state"], state, "{every}");
+    }
+}
+
+#[test]
+fn reports_do_not_replace_each_other_and_are_made_again() {
+    let bench = folder();
+    let run = |reports: [&str; 2], more: &[&str]| {
+        bench.write("manifest.csv", format!("file,report\nin/a.csv,{}\nin/b.csv,{}\n", reports[0], reports[1]));
+        let batch = ["-q", "batch", "evaluate", "--manifest", "manifest.csv", "--sensor", "sensor.toml", "-o", "out"];
+        bench.run(&[&batch[..], more].concat())
+    };
+    for (reports, why) in [
+        (["r.html", "r.html"], "cannot write out/r.html for in/b.csv: another output has the same name"),
+        (["b.json", "r.html"], "cannot write out/b.json for in/a.csv: another output has the same name"),
+        (["batch.jsonl", "r.html"], "cannot write out/batch.jsonl for in/a.csv: it is the name of the summary"),
+    ] {
+        let refused = run(reports, &[]);
+        assert!(refused.code == Some(2) && refused.stderr.contains(why), "{}", refused.stderr);
+    }
+    run(["a.html", "b.html"], &[]).ok();
+    fs::remove_file(bench.path("out/a.html")).unwrap();
+    run(["a.html", "b.html"], &["--summary", "json"]).ok();
+    let rows = summary(&bench);
+    assert_eq!([&rows[0]["state"], &rows[1]["state"]], ["done", "kept"]);
+    assert!(bench.path("out/a.html").exists());
+}
+
+/// A file may lie deeper than a single name can be long.
+#[test]
+fn long_paths_are_no_names() {
+    let bench = folder();
+    let deep = format!("in/{0}/{0}/{0}", "deep".repeat(25));
+    fs::create_dir_all(bench.path(&deep)).unwrap();
+    bench.write(&format!("{deep}/a.csv"), bench.read("in/a.csv"));
+    bench.run(&SMOOTH).ok();
+    assert!(bench.path(&deep.replacen("in", "out", 1)).join("a.csv").exists());
+}
+
+#[test]
+fn a_batch_calibrates_recordings_of_one_channel() {
+    let bench = folder();
+    bench.write("in/two.csv", "time_s,a_ohm,b_ohm,strain\n0,1,1,0\n");
+    let run = bench.run(&["-q", "batch", "calibrate", "in/two.csv", "-o", "out"]);
+    let why = "in/two.csv: expected readings of one channel, found those of several; use `ohmstrain calibrate`";
+    assert!(run.code == Some(5) && run.stderr.contains(why), "{}", run.stderr);
 }
 
 /// A CSV and the CSV filtered from its Parquet contain the same numbers, as output and as input.

@@ -58,7 +58,7 @@ pub enum BatchCommand {
     Hand,
     /// Scores, as JSON
     Evaluate,
-    /// A sensor of each recording, or of those that the manifest gives the same name in its column sensor
+    /// A sensor of each recording of one channel, or of those that the manifest gives the same name in its column sensor
     Calibrate,
 }
 
@@ -81,6 +81,6 @@ Exit code 5 says that there were such. Outputs lie in DIR as the recordings lie 
 DIR/summary.csv has a row per recording: state, messages and warnings, scores, SHA-256 of recording, \
 sensor, prior and output, flags and version. DIR/batch.jsonl grows by a line with each recording \
 that is done. Another run with the same DIR does what is not there yet, or has changed: recording, \
-sensor, prior, flags, version or output.
+sensor, prior, marks, flags, version or output.
 
 Paths in a manifest start at its folder. An empty cell is a flag that is not given; `true` gives one without a value.";

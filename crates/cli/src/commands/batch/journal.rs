@@ -23,6 +23,9 @@ pub struct Entry {
     pub sensor_sha256: Option<String>,
     /// SHA-256 of the file that `--prior` among the flags names.
     pub prior_sha256: Option<String>,
+    /// SHA-256 of each file that `--marks` among the flags names.
+    #[serde(default)]
+    pub marks_sha256: Vec<String>,
     /// Flags other than `--sensor` and those that `batch` adds.
     pub flags: Vec<String>,
     /// Name and version of the program.
@@ -73,7 +76,8 @@ impl Entry {
             let names: Vec<_> = of.files.iter().filter_map(|file| file.file_name()).map(ToOwned::to_owned).collect();
             (of.command.clone(), of.flags.clone(), of.made_by.clone(), names)
         };
-        let bytes = |of: &Self| (of.sha256.clone(), of.sensor_sha256.clone(), of.prior_sha256.clone());
+        let beside = |of: &Self| (of.sensor_sha256.clone(), of.prior_sha256.clone(), of.marks_sha256.clone());
+        let bytes = |of: &Self| (of.sha256.clone(), beside(of));
         work(self) == work(other) && bytes(self) == bytes(other)
     }
 }

@@ -93,7 +93,7 @@ impl Work<'_> {
         let mut entry = self.workshop.entry(job);
         if let Err(message) = self.workshop.hash_inputs(job, &mut entry) {
             entry.message = message;
-        } else if let Some(done) = self.journal.finished(&entry).filter(|_| !self.args.again) {
+        } else if let Some(done) = self.journal.finished(&entry).filter(|_| !self.args.again && job.has_reports()) {
             return Ok(Entry { state: State::Kept, ..done });
         } else {
             self.workshop.finish(job, &mut entry, self.journal)?;

@@ -23,8 +23,14 @@ pub struct Job {
     pub files: Vec<PathBuf>,
     /// File of the sensor's parameters, if the command takes one.
     pub sensor: Option<PathBuf>,
+    /// True if the flags name that file.
+    has_sensor_flag: bool,
     /// File that `--prior` among the flags names.
     pub prior: Option<PathBuf>,
+    /// Files of marks, one for each recording.
+    pub marks: Vec<PathBuf>,
+    /// Report and folder of figures.
+    pub beside: Vec<PathBuf>,
     /// Estimator that `--estimator` among the flags names.
     estimator: Option<EstimatorKind>,
     /// Further flags.
@@ -41,7 +47,12 @@ impl Job {
 
     /// Returns the files that it reads.
     pub fn inputs(&self) -> impl Iterator<Item = &PathBuf> {
-        self.files.iter().chain(&self.sensor).chain(&self.prior)
+        self.files.iter().chain(&self.sensor).chain(&self.prior).chain(&self.marks)
+    }
+
+    /// True if its report and figures are there, or it has none.
+    pub fn has_reports(&self) -> bool {
+        self.beside.iter().all(|path| path.exists())
     }
 
     /// Returns its name in messages.
@@ -56,7 +67,8 @@ impl Job {
             words.extend(["-o".to_owned(), "sensor.toml".to_owned()]);
         }
         words.extend(self.flags.iter().cloned());
-        if let Some(sensor) = self.sensor.as_ref().filter(|_| args.command != BatchCommand::Hand) {
+        let sensor = self.sensor.as_ref().filter(|_| !self.has_sensor_flag && args.command != BatchCommand::Hand);
+        if let Some(sensor) = sensor {
             words.extend(["--sensor".into(), sensor.display().to_string()]);
         }
         match args.command {
@@ -124,32 +136,51 @@ fn listed(manifest: &Path, args: &BatchArgs, plain: &dyn Fn(PathBuf) -> Job) -> 
     }
     let folder = manifest.parent().unwrap_or(Path::new(""));
     let (mut jobs, mut made): (Vec<Job>, HashMap<PathBuf, usize>) = (Vec::new(), HashMap::new());
+    let mut all_marks: Vec<Vec<PathBuf>> = Vec::new();
     for row in rows.records() {
-        let row = ManifestRow { manifest, header: &header, cells: row.map_err(wrong)? };
-        let job = row.job(folder, args, plain)?;
+        let cells = row.map_err(wrong)?;
+        let row = ManifestRow { place: format!("{}:{}", manifest.display(), whole_file::line(&text, &cells)), cells };
+        let (job, marks) = row.job(&header, folder, args, plain)?;
         let is_shared = args.command == BatchCommand::Calibrate && !job.output.as_os_str().is_empty();
-        match made.get(&job.output).filter(|_| is_shared) {
-            Some(first) => jobs[*first].files.extend(job.files),
+        let place = match made.get(&job.output).filter(|_| is_shared) {
+            Some(first) => {
+                row.check_flags(&jobs[*first], &job)?;
+                jobs[*first].files.extend(job.files);
+                *first
+            }
             None => {
                 made.insert(job.output.clone(), jobs.len());
                 jobs.push(job);
+                jobs.len() - 1
             }
-        }
+        };
+        all_marks.resize(jobs.len(), Vec::new());
+        all_marks[place].extend(marks);
+    }
+    for (job, marks) in jobs.iter_mut().zip(all_marks) {
+        job.flags.extend(marks.iter().flat_map(|marks| ["--marks".to_owned(), marks.display().to_string()]));
     }
     Ok(jobs)
 }
 
 /// A row of a manifest.
-struct ManifestRow<'a> {
-    manifest: &'a Path,
-    header: &'a StringRecord,
+struct ManifestRow {
+    /// Its file and line.
+    place: String,
     cells: StringRecord,
 }
 
-impl ManifestRow<'_> {
-    fn job(&self, folder: &Path, args: &BatchArgs, plain: &dyn Fn(PathBuf) -> Job) -> Result<Job, CliError> {
-        let mut job = plain(PathBuf::new());
-        for (name, cell) in self.header.iter().map(str::trim).zip(self.cells.iter().map(str::trim)) {
+impl ManifestRow {
+    /// Returns its job, and its file of marks, which is not among the job's flags.
+    fn job(
+        &self,
+        header: &StringRecord,
+        folder: &Path,
+        args: &BatchArgs,
+        plain: &dyn Fn(PathBuf) -> Job,
+    ) -> Result<(Job, Option<PathBuf>), CliError> {
+        let (mut job, mut marks) = (plain(PathBuf::new()), None);
+        for (name, cell) in header.iter().map(str::trim).zip(self.cells.iter().map(str::trim)) {
             match name {
                 "file" => job.files = vec![folder.join(cell)],
                 _ if cell.is_empty() => {}
@@ -160,6 +191,7 @@ impl ManifestRow<'_> {
                     let path = args.output.join(self.below(name, cell)?);
                     job.flags.extend([format!("--{name}"), path.display().to_string()]);
                 }
+                "marks" => marks = Some(folder.join(cell)),
                 "prior" => job.flags.extend(["--prior".to_owned(), folder.join(cell).display().to_string()]),
                 _ => {
                     job.flags.push(format!("--{}", name.replace('_', "-")));
@@ -167,7 +199,22 @@ impl ManifestRow<'_> {
                 }
             }
         }
-        Ok(job)
+        Ok((job, marks))
+    }
+
+    /// Refuses flags that differ from those of an earlier row of the same sensor.
+    fn check_flags(&self, first: &Job, job: &Job) -> Result<(), CliError> {
+        if first.flags == job.flags {
+            return Ok(());
+        }
+        let flags =
+            |of: &Job| if of.flags.is_empty() { "none".to_owned() } else { format!("`{}`", of.flags.join(" ")) };
+        Err(CliError::Input(format!(
+            "{}: expected the flags of the first row of its sensor, {}, found {}",
+            self.place,
+            flags(first),
+            flags(job)
+        )))
     }
 
     /// Returns the path of an output; fails unless it lies below the folder of outputs.
@@ -176,9 +223,9 @@ impl ManifestRow<'_> {
         if parts().next().is_some() && parts().all(|part| matches!(part, Component::Normal(_))) {
             return Ok(parts().collect());
         }
-        let (file, line) = (self.manifest.display(), self.cells.position().map_or(0, csv::Position::line));
         Err(CliError::Input(format!(
-            "{file}:{line}: column `{column}`: expected a name below the folder of outputs (-o), found `{cell}`"
+            "{}: column `{column}`: expected a name below the folder of outputs (-o), found `{cell}`",
+            self.place
         )))
     }
 }
@@ -233,10 +280,10 @@ fn check_arguments(job: &mut Job, args: &BatchArgs) -> Result<(), CliError> {
             renamed::answer(&error, &name_of(args.command)).map_or(String::new(), |answer| format!(": {answer}"));
         CliError::Arguments(format!("{}: {}{answer}", job.name(), text.trim_start_matches("error: ")))
     })?;
-    let (output, beside) = match parsed.command {
+    let (output, sensor, beside) = match parsed.command {
         Command::Calibrate(calibrate) => {
-            job.prior = calibrate.prior;
-            (None, vec![calibrate.report.report, calibrate.report.figures])
+            (job.prior, job.marks) = (calibrate.prior, calibrate.marks);
+            (None, None, vec![calibrate.report.report, calibrate.report.figures])
         }
         Command::Filter(filter) => {
             job.estimator = filter.estimate.estimator.chosen();
@@ -244,25 +291,29 @@ fn check_arguments(job: &mut Job, args: &BatchArgs) -> Result<(), CliError> {
                 let what = "--save-state and --resume are of one stream: use `ohmstrain filter` without batch";
                 return Err(CliError::Arguments(what.into()));
             }
-            (filter.written.output, vec![])
+            (filter.written.output, Some(filter.estimate.sensor), vec![])
         }
         Command::Smooth(smooth) => {
             job.estimator = smooth.estimate.estimator.chosen();
-            (smooth.written.output, vec![])
+            (smooth.written.output, Some(smooth.estimate.sensor), vec![])
         }
         Command::Evaluate(evaluate) => {
             job.estimator = if let Estimators::One(kind) = evaluate.estimator { Some(kind) } else { None };
-            (None, vec![evaluate.report.report, evaluate.report.figures])
+            (None, evaluate.calibration.sensor, vec![evaluate.report.report, evaluate.report.figures])
         }
-        Command::Hand(hand) => (hand.output, vec![]),
-        _ => (None, vec![]),
+        Command::Hand(hand) => (hand.output, None, vec![]),
+        _ => (None, None, vec![]),
     };
+    if job.sensor.is_none() {
+        (job.has_sensor_flag, job.sensor) = (sensor.is_some(), sensor);
+    }
     // Files that a manifest names lie in the folder of outputs; a name given after `--` would be written by each recording.
     let named = |path: &PathBuf| path.starts_with(&args.output) && !args.flags.iter().any(|flag| is_output(flag));
     if output.is_some() || !beside.iter().flatten().all(named) {
         let what = "batch names the outputs itself, or as the manifest's columns `output`, `report` and `figures` say";
         return Err(CliError::Arguments(what.into()));
     }
+    job.beside = beside.into_iter().flatten().collect();
     Ok(())
 }
 
@@ -290,28 +341,30 @@ pub fn check_outputs(jobs: &[Job], args: &BatchArgs, journal: &Journal) -> Resul
     let inputs = jobs.iter().flat_map(Job::inputs);
     let inputs: HashSet<PathBuf> = inputs.filter_map(|file| fs::canonicalize(file).ok()).collect();
     let mut outputs = HashSet::new();
-    for job in jobs {
-        let path = args.output.join(&job.output);
+    let own = jobs.iter().map(|job| (job, args.output.join(&job.output), "output"));
+    let beside = jobs.iter().flat_map(|job| job.beside.iter().map(move |path| (job, path.clone(), "report")));
+    for (job, path, column) in own.chain(beside) {
         let refused =
             |why: &str| CliError::Arguments(format!("cannot write {} for {}: {why}", path.display(), job.name()));
-        if !job.output.components().all(|part| matches!(part, Component::Normal(_))) {
+        let name = path.strip_prefix(&args.output).unwrap_or(&path);
+        if !name.components().all(|part| matches!(part, Component::Normal(_))) {
             return Err(refused("it is not in the folder of outputs"));
         }
-        if !outputs.insert(&job.output) {
-            return Err(refused(
-                "another recording's output has the same name; name them in a manifest's column `output`",
-            ));
+        if !outputs.insert(path.clone()) {
+            let why = format!("another output has the same name; name them in a manifest's column `{column}`");
+            return Err(refused(&why));
         }
-        if job.output == Path::new(JOURNAL) || job.output.with_extension("") == Path::new(SUMMARY) {
-            return Err(refused(
-                "it is the name of the summary or the journal; name it in a manifest's column `output`",
-            ));
+        if name == Path::new(JOURNAL) || name.with_extension("") == Path::new(SUMMARY) {
+            let why =
+                format!("it is the name of the summary or the journal; name it in a manifest's column `{column}`");
+            return Err(refused(&why));
         }
         let Ok(found) = fs::canonicalize(&path) else { continue };
         if inputs.contains(&found) {
             return Err(refused("it is an input; choose another folder"));
         }
-        if !args.force && !journal.knows(&job.output) {
+        // Reports and figures say themselves what wrote them.
+        if column == "output" && !args.force && !journal.knows(&job.output) {
             return Err(refused(
                 "no earlier run wrote what is there; choose another folder, or replace it with --force",
             ));

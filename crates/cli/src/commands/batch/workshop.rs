@@ -4,6 +4,7 @@ use std::fs;
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
@@ -11,6 +12,7 @@ use super::journal::{Entry, Journal, State};
 use super::plan::Job;
 use super::scores::Figures;
 use crate::args::{BatchArgs, Command, name_of};
+use crate::channels::Table;
 use crate::commands::evaluate::{self, Evaluation};
 use crate::commands::hand::{self, description};
 use crate::commands::{calibrate, filter, smooth};
@@ -30,6 +32,8 @@ pub struct Workshop<'a> {
     args: &'a BatchArgs,
     /// Folder of unfinished outputs. It lies in the folder of outputs, so that publishing a file is a rename.
     drafts: UnfinishedFolder,
+    /// Number of drafts so far, which are their names: a path could be too long for one name.
+    drafted: AtomicUsize,
     /// Hashes of sensors and priors, which many recordings share.
     shared: Mutex<HashMap<PathBuf, String>>,
 }
@@ -39,7 +43,7 @@ impl<'a> Workshop<'a> {
     pub fn new(args: &'a BatchArgs) -> Result<Self, CliError> {
         let drafts =
             UnfinishedFolder::inside(&args.output).map_err(|error| CliError::file("write to", &args.output, &error))?;
-        Ok(Self { args, drafts, shared: Mutex::default() })
+        Ok(Self { args, drafts, drafted: AtomicUsize::new(0), shared: Mutex::default() })
     }
 
     /// Returns the entry of a job before it runs.
@@ -70,6 +74,9 @@ impl<'a> Workshop<'a> {
         };
         entry.sensor_sha256 = shared(&job.sensor)?;
         entry.prior_sha256 = shared(&job.prior)?;
+        for file in &job.marks {
+            entry.marks_sha256.push(sha256_of(file).map_err(|error| unreadable(file, &error))?);
+        }
         Ok(())
     }
 
@@ -96,7 +103,9 @@ impl<'a> Workshop<'a> {
         let start = Instant::now();
         let path = self.args.output.join(&job.output);
         let cannot_write = |error: &io::Error| CliError::file("write", &path, error);
-        let draft = self.drafts.path().join(job.output.to_string_lossy().replace(['/', '\\'], "|"));
+        let number = self.drafted.fetch_add(1, Ordering::Relaxed);
+        let draft =
+            self.drafts.path().join(number.to_string()).with_extension(job.output.extension().unwrap_or_default());
         self.run(job, &draft, entry);
         entry.seconds = start.elapsed().as_secs_f64();
         // `evaluate --check` writes its output even if it fails.
@@ -177,6 +186,11 @@ fn run_command(command: Command, draft: &Path, entry: &mut Entry, messages: &Mes
             judged?;
         }
         Command::Calibrate(mut args) => {
+            if let Some(path) = args.traces.iter().find(|path| Table::read(path).is_ok_and(|table| table.is_some())) {
+                let what =
+                    "expected readings of one channel, found those of several; use `ohmstrain calibrate` without batch";
+                return Err(CliError::Input(format!("{}: {what}", path.display())));
+            }
             args.output = draft.to_path_buf();
             let outcome = calibrate::calibrate(&args, messages)?;
             entry.figures = outcome.findings.as_ref().map(Figures::of_findings).unwrap_or_default();
