@@ -4,8 +4,9 @@ use thiserror::Error;
 
 use crate::row::ReferenceQuantity;
 
-/// Largest number of steps in a protocol, and longest step, s.
-const MOST_STEPS: usize = 10_000;
+/// Largest number of steps in a protocol.
+pub const MOST_STEPS: usize = 10_000;
+/// Longest step, s.
 const LONGEST_S: f64 = 1e5;
 /// Time after which the body is assumed to have settled, s, and its largest value as a fraction of the hold.
 const SETTLING_S: f64 = 1.0;
@@ -72,6 +73,14 @@ pub enum PacingError {
     /// Fewer than two positions, or all with the same value.
     #[error("expected at least two positions of different values, found {0}")]
     Positions(usize),
+    /// Two positions or two joints of one name.
+    #[error("expected each {what} once, found `{name}` twice")]
+    Twice {
+        /// What they are.
+        what: &'static str,
+        /// Their name.
+        name: String,
+    },
     /// A position whose number of values is not that of joints.
     #[error("position `{position}`: expected {expected}, found {found}")]
     Values {
@@ -93,8 +102,8 @@ pub enum PacingError {
         found: String,
     },
     /// Too many steps.
-    #[error("expected at most {MOST_STEPS} steps, found {0}")]
-    Steps(usize),
+    #[error("expected at most {MOST_STEPS} steps, found more")]
+    Steps,
 }
 
 impl PacedStep {
@@ -122,6 +131,12 @@ impl Pacing {
         let first = self.positions.first();
         if self.positions.iter().all(|other| Some(&other.values) == first.map(|first| &first.values)) {
             return Err(PacingError::Positions(self.positions.len().min(1)));
+        }
+        let positions: Vec<&String> = self.positions.iter().map(|position| &position.name).collect();
+        for (what, names) in [("position", positions), ("joint", self.joints.iter().collect())] {
+            if let Some((_, name)) = names.iter().enumerate().find(|(place, name)| names[..*place].contains(name)) {
+                return Err(PacingError::Twice { what, name: (*name).clone() });
+            }
         }
         let expected = self.joints.len().max(1);
         for position in &self.positions {
@@ -155,7 +170,7 @@ impl Pacing {
                 return Err(fault("time for the move from another position (`move_s`)", step.move_s));
             }
         }
-        if self.steps.len() > MOST_STEPS { Err(PacingError::Steps(self.steps.len())) } else { Ok(()) }
+        if self.steps.len() > MOST_STEPS { Err(PacingError::Steps) } else { Ok(()) }
     }
 
     /// Returns the duration of all steps, s.
@@ -168,6 +183,21 @@ impl Pacing {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn names_are_unique() {
+        let position = |name: &str, value: f64| Position { name: name.into(), values: vec![value; 2], sd: 0.01 };
+        let (quantity, steps) = (ReferenceQuantity::Strain, Vec::new());
+        let joints = vec!["index".to_owned(), "middle".to_owned()];
+        let pacing = Pacing { quantity, joints, positions: vec![position("rest", 0.0), position("full", 0.2)], steps };
+        assert_eq!(pacing.validate(), Ok(()));
+        let mut twice = pacing.clone();
+        twice.positions[1].name = "rest".into();
+        assert_eq!(twice.validate(), Err(PacingError::Twice { what: "position", name: "rest".into() }));
+        let mut twice = pacing;
+        twice.joints[1] = "index".into();
+        assert_eq!(twice.validate(), Err(PacingError::Twice { what: "joint", name: "index".into() }));
+    }
 
     #[test]
     fn a_hold_is_certain_after_it_has_settled_and_before_it_ends() {

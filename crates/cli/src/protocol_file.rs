@@ -101,10 +101,17 @@ impl File {
             if are_angles { (ReferenceQuantity::AngleDeg, "angle_deg") } else { (ReferenceQuantity::Strain, "strain") };
         let mut positions = Vec::with_capacity(self.positions.len());
         for position in &self.positions {
-            let (found, sd, other) = match quantity {
-                ReferenceQuantity::AngleDeg => (&position.angle_deg, position.angle_sd, &position.strain),
-                ReferenceQuantity::Strain => (&position.strain, position.strain_sd, &position.angle_deg),
+            let (found, sd, other, other_sd) = match quantity {
+                ReferenceQuantity::AngleDeg => {
+                    (&position.angle_deg, position.angle_sd, &position.strain, ("strain_sd", position.strain_sd))
+                }
+                ReferenceQuantity::Strain => {
+                    (&position.strain, position.strain_sd, &position.angle_deg, ("angle_sd", position.angle_sd))
+                }
             };
+            if let (name, Some(_)) = other_sd {
+                return Err(format!("position `{}`: expected no `{name}` beside `{column}`, found one", position.name));
+            }
             let values = match found {
                 _ if other.is_some() => {
                     return Err(format!(

@@ -130,6 +130,9 @@ fn what_cannot_be_followed_is_named() {
         (two.replace("0.1", "[0.1, 0.2]"), "position `b`: expected one value"),
         (two.replace("strain = 0.1", "angle_deg = 9"), "position `a`: expected `angle_deg` alone"),
         (two.replace("strain", "strian"), "protocol.toml:4: unknown field `strian`"),
+        (two.replace("\"b\"", "\"a\""), "protocol.toml: expected each position once, found `a` twice"),
+        (format!("joints = [\"x\", \"x\"]\n{two}"), "protocol.toml: expected each joint once, found `x` twice"),
+        (format!("{two}angle_sd = 2\n"), "position `b`: expected no `angle_sd` beside `strain`, found one"),
     ] {
         let message = protocol(&text);
         assert!(message.contains(says), "{message}\n{text}");
@@ -139,6 +142,28 @@ fn what_cannot_be_followed_is_named() {
     let run = record(&bench, "board.csv", &[]);
     let says = "joint `thumb` of the protocol: expected a column `thumb_ohm`, `thumb_ratio` or `thumb_adc`";
     assert!(run.code == Some(4) && run.stderr.contains(says), "{}", run.stderr);
+}
+
+#[test]
+fn what_cannot_be_planned_or_simulated_is_named() {
+    let bench = Bench::new();
+    let plan = |flags: [&str; 4], says: &str| {
+        let run = bench.run(&[&["plan", "-o", "protocol.toml"], &flags[..]].concat());
+        assert!(run.code == Some(2) && run.stderr.contains(says), "{}", run.stderr);
+    };
+    let positions = "rest=0 full=0.2";
+    plan(["--strains", "rest=0 rest=0.2", "--minutes", "4"], "expected each position once, found `rest` twice");
+    plan(["--strains", positions, "--joints", "a,a"], "expected each joint once, found `a` twice");
+    plan(["--strains", positions, "--minutes", "1e12"], "expected at most 10000 steps, found more");
+    bench.run(&["plan", "-o", "protocol.toml", "--strains", positions]).ok();
+    let text = bench.read("protocol.toml");
+    for empty in
+        [text.split("[[steps]]").next().unwrap().to_owned(), text.replacen("format = 1", "format = 1\nrepeat = 0", 1)]
+    {
+        bench.write("empty.toml", empty);
+        let run = bench.run(&["simulate", "--follow", "empty.toml"]);
+        run.fails(4, "empty.toml: expected steps to follow, found none");
+    }
 }
 
 #[test]

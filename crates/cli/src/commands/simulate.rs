@@ -40,6 +40,9 @@ fn protocol(args: &SimulateArgs) -> Result<Protocol, CliError> {
 fn followed(args: &SimulateArgs) -> Result<Option<Followed>, CliError> {
     let Some(path) = &args.follow else { return Ok(None) };
     let pacing = protocol_file::read(path)?;
+    if pacing.steps.is_empty() {
+        return Err(CliError::Input(format!("{}: expected steps to follow, found none", path.display())));
+    }
     let joint = match &args.joint {
         None => 0,
         Some(name) => pacing.joints.iter().position(|joint| joint == name).ok_or_else(|| {

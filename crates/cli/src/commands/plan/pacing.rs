@@ -1,6 +1,6 @@
 //! A protocol for a person: each position from below and from above, at several paces, with long and short holds.
 
-use ohmstrain_bench_data::pacing::{PacedStep, Pacing};
+use ohmstrain_bench_data::pacing::{MOST_STEPS, PacedStep, Pacing};
 
 /// Duration of the rest at the beginning and at the end, and of one long hold, s.
 const REST_S: f64 = 20.0;
@@ -26,7 +26,8 @@ pub fn steps(pacing: &Pacing, minutes: f64) -> Vec<PacedStep> {
         let hold_s = if k == 0 { LONG_S } else { *hold_s };
         let step = PacedStep { to, move_s: *move_s, hold_s };
         elapsed_s += step.duration_s();
-        if elapsed_s > 60.0 * minutes && steps.len() > 2 * last {
+        // More than the most are refused later.
+        if steps.len() > MOST_STEPS || (elapsed_s > 60.0 * minutes && steps.len() > 2 * last) {
             break;
         }
         steps.push(step);
