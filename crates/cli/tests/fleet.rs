@@ -133,6 +133,9 @@ fn what_is_no_fleet_is_refused() {
         assert!(!bench.path("out.toml").exists());
     };
     refused(&["fleet", "fit", "sensor.toml", "two.toml", "-o", "out.toml"], 4, "2 sensors; a fleet has at least 3");
+    bench.write("angle.toml", bench.read("sensor.toml").replace("quantity = \"strain\"", "quantity = \"angle_deg\""));
+    let mixed = "angle.toml: expected a sensor of `strain`, as sensor.toml is one, found one of `angle_deg`";
+    refused(&["fleet", "fit", "sensor.toml", "two.toml", "angle.toml", "-o", "out.toml"], 4, mixed);
     refused(&["fleet", "fit", "trace.csv", "-o", "out.toml"], 4, "is a recording");
     let calibrate = ["calibrate", "trace.csv", "-o", "out.toml", "--prior"];
     refused(&[&calibrate[..], &["sensor.toml"]].concat(), 4, "field `format`: expected version 2, found 9");

@@ -1,4 +1,4 @@
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use ohmstrain::{Prior, Sensor};
 use ohmstrain_bench_data::counted;
@@ -17,6 +17,7 @@ pub fn run(args: &FleetArgs, messages: &Messages) -> Result<(), CliError> {
     let output = outputs.claim(&args.output, Kind::Prior)?;
     let sensors = args.sensors.iter().map(|path| sensor_file::read(path, None));
     let sensors: Vec<Sensor> = sensors.collect::<Result<_, _>>()?;
+    refuse_other_quantities(&args.sensors, &sensors)?;
     let prior = Prior::learn(&sensors)?;
     outputs.put(output, prior.to_toml()?.into_bytes());
     outputs.publish()?;
@@ -24,6 +25,21 @@ pub fn run(args: &FleetArgs, messages: &Messages) -> Result<(), CliError> {
         print(|out| Ok(writeln!(out, "{}", summary(&prior, &args.output))?))?;
     }
     Ok(())
+}
+
+fn refuse_other_quantities(files: &[PathBuf], sensors: &[Sensor]) -> Result<(), CliError> {
+    let mut of_files = files.iter().zip(sensors.iter().map(|sensor| sensor.params().quantity));
+    let Some((first, expected)) = of_files.next() else { return Ok(()) };
+    match of_files.find(|(_, found)| *found != expected) {
+        None => Ok(()),
+        Some((file, found)) => Err(CliError::Input(format!(
+            "{}: expected a sensor of `{}`, as {} is one, found one of `{}`",
+            file.display(),
+            expected.name(),
+            first.display(),
+            found.name()
+        ))),
+    }
 }
 
 /// Summarises the prior in a few words.
