@@ -8,6 +8,7 @@ const WRAP_US: u64 = 1 << 32;
 pub(crate) const WRAP_WITHIN: u64 = 8;
 
 /// The time column, checked to increase strictly.
+#[derive(Clone, Copy)]
 pub(crate) enum Clock {
     Seconds { last: Option<f64> },
     Microseconds { last: Option<Microseconds> },

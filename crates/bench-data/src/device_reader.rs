@@ -32,6 +32,8 @@ pub struct DeviceReader<R> {
     /// Lines above the header that are not part of a trace.
     skipped: vec::IntoIter<BadContent>,
     has_rows: bool,
+    /// Last time of the previous stream, from which the first row continues.
+    from: Option<LastTime>,
     /// True if a header has followed rows.
     restarted: bool,
     done: bool,
@@ -86,7 +88,7 @@ impl<R: Read> DeviceReader<R> {
         let (file, lines) = (called(name), Lines::new(source));
         let parser = LineParser::new(&file, overrides.clone());
         let skipped = Vec::new().into_iter();
-        Self { file, lines, parser, skipped, has_rows: false, restarted: false, done: false }
+        Self { file, lines, parser, skipped, has_rows: false, from: None, restarted: false, done: false }
     }
 
     /// Returns the name of the source in messages.
@@ -128,6 +130,7 @@ impl<R: Read> DeviceReader<R> {
     /// Continues from the last time of a previous stream: the first row must be later, and a counter may have wrapped. Returns `false` if
     /// that stream used another unit of time.
     pub fn go_on(&mut self, from: LastTime) -> bool {
+        self.from = Some(from);
         self.parser.go_on(from)
     }
 
@@ -149,7 +152,10 @@ impl<R: Read> DeviceReader<R> {
                     return Some(Ok(DeviceRow { row, restarted: std::mem::take(&mut self.restarted) }));
                 }
                 Ok(Line::Restarted(row)) => return Some(Ok(DeviceRow { row, restarted: true })),
-                Ok(Line::Header) => self.restarted = self.has_rows,
+                // A header that is printed twice before the first row does not restart the clock.
+                Ok(Line::Header) => {
+                    self.restarted = self.has_rows || self.from.is_some_and(|from| !self.parser.go_on(from));
+                }
                 Ok(Line::Nothing) => {}
                 Err(error) => return Some(Err(error)),
             }

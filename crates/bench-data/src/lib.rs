@@ -68,6 +68,7 @@ pub use device_reader::{DeviceReader, DeviceRow};
 pub use error::{BadContent, SpecError, TraceError};
 pub use headed::Headed;
 pub use line_parser::{Line, LineParser};
+pub use lines::cells;
 pub use metadata::{Metadata, ResistanceUnit, StrainUnit};
 #[cfg(feature = "import")]
 pub use parquet_text::ParquetText;

@@ -40,9 +40,14 @@ struct Stream {
     /// Metadata with the overrides.
     metadata: Metadata,
     parser: RowParser,
-    /// Clock of the late rows, and their number.
-    late: Option<(RowParser, u32)>,
+    late: Option<Late>,
 }
+
+/// Parser with the clock of the late rows, and their number.
+type Late = (RowParser, u32);
+
+/// Parser with the clock of a stream, and that of its late rows.
+type Clocks = (RowParser, Option<Late>);
 
 /// Kind of a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -143,6 +148,44 @@ impl LineParser {
         self.of_line(line).map_err(|fault| fault.at(&self.name, self.number))
     }
 
+    /// Parses a line with several parsers, one for each column of readings. A line that one of them refuses is a row for none: it leaves the
+    /// clocks of the others as they were.
+    ///
+    /// # Errors
+    /// The fault, and the index of the parser that found it; faulty content is reported before a late time.
+    pub fn take_together<'p>(
+        parsers: impl IntoIterator<Item = &'p mut Self>,
+        line: &[u8],
+    ) -> Result<Vec<Line>, (usize, BadContent)> {
+        let mut parsers: Vec<&mut Self> = parsers.into_iter().collect();
+        let clocks: Vec<Option<Clocks>> = parsers.iter().map(|parser| parser.clocks()).collect();
+        let taken: Vec<Result<Line, BadContent>> = parsers.iter_mut().map(|parser| parser.take(line)).collect();
+        let fault = |is_late: bool| {
+            let found = taken.iter().enumerate().filter_map(|(index, taken)| Some((index, taken.as_ref().err()?)));
+            found.into_iter().find(|(_, fault)| fault.is_late == is_late).map(|(index, fault)| (index, fault.clone()))
+        };
+        let Some(fault) = fault(false).or_else(|| fault(true)) else {
+            return Ok(taken.into_iter().flatten().collect());
+        };
+        for ((parser, clocks), taken) in parsers.into_iter().zip(clocks).zip(&taken) {
+            // Late lines count towards a restart of the clock.
+            if taken.is_ok() || !fault.1.is_late {
+                parser.restore(clocks);
+            }
+        }
+        Err(fault)
+    }
+
+    fn clocks(&self) -> Option<Clocks> {
+        self.stream.as_ref().map(|stream| (stream.parser, stream.late))
+    }
+
+    fn restore(&mut self, clocks: Option<Clocks>) {
+        if let (Some(stream), Some((parser, late))) = (&mut self.stream, clocks) {
+            (stream.parser, stream.late) = (parser, late);
+        }
+    }
+
     /// Parses the line with this number.
     pub(crate) fn take_numbered(&mut self, line: &str, number: u64) -> Result<Line, Fault> {
         self.number = number;
@@ -228,6 +271,25 @@ mod tests {
     fn garbage_is_one_line_and_leaves_the_clock() {
         let lines = ["time_s,resistance_ohm", "1,1600", "9e9,-3", "\"7", "2,x,3", "2,1600"];
         assert_eq!(times(&lines), [None, Some(1.0), None, None, None, Some(2.0)]);
+    }
+
+    #[test]
+    fn a_line_that_one_of_several_parsers_refuses_leaves_the_clocks() {
+        let header = ["time_s,resistance_ohm,_", "time_s,_,resistance_ohm"];
+        let mut parsers = header.map(|_| LineParser::new("-", Metadata::default()));
+        for (parser, header) in parsers.iter_mut().zip(header) {
+            assert!(parser.take(header.as_bytes()).is_ok());
+        }
+        let mut take = |line: &str| LineParser::take_together(&mut parsers, line.as_bytes());
+        let is_row = |taken: &Result<Vec<Line>, _>| matches!(taken, Ok(lines) if matches!(lines[..], [Line::Row(_), Line::Row(_)]));
+        assert!(is_row(&take("1,1600,1700")));
+        let (index, fault) = take("9999,1600,x").unwrap_err();
+        assert!(index == 1 && !fault.is_late, "{fault}");
+        assert!(is_row(&take("2,1600,1700")));
+        // A corrupt line does not count among the late ones, and both clocks restart with the third.
+        let late = ["0.1,1600,1700", "9999,1600,x", "0.2,1600,1700", "0.3,1600,1700"].map(take);
+        assert!(late[..3].iter().all(Result::is_err), "{late:?}");
+        assert!(matches!(late[3].as_deref(), Ok([Line::Restarted(_), Line::Restarted(_)])), "{late:?}");
     }
 
     #[test]

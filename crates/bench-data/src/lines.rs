@@ -135,6 +135,21 @@ impl<R: Read> LineFeed<R> {
     }
 }
 
+/// Returns the cells of a line without spaces around them and without quotation marks; `None` if those are not in pairs.
+///
+/// ```
+/// use ohmstrain_bench_data::cells;
+/// let expected = vec!["0.05".to_owned(), "1600".into(), "warm, dry".into()];
+/// assert_eq!(cells("0.05, 1600,\"warm, dry\"\r\n"), Some(expected));
+/// assert_eq!(cells("0.05,\"1600"), None);
+/// ```
+#[must_use]
+pub fn cells(line: &str) -> Option<Vec<String>> {
+    let mut cells = StringRecord::new();
+    take_apart(line.trim_start_matches('\u{feff}').trim(), &mut cells).ok()?;
+    Some(cells.iter().map(|cell| cell.trim().to_owned()).collect())
+}
+
 /// Splits a single line into cells.
 pub(crate) fn take_apart(line: &str, cells: &mut StringRecord) -> Result<(), Fault> {
     cells.clear();

@@ -9,6 +9,7 @@ use crate::metadata::{Metadata, ResistanceUnit, StrainUnit};
 use crate::row::{Reading, ReadingKind, ReferenceQuantity, Row};
 
 /// Converts the cells of a line to a row; keeps the time of the previous row.
+#[derive(Clone, Copy)]
 pub(crate) struct RowParser {
     columns: Columns,
     conversion: Conversion,
@@ -16,6 +17,7 @@ pub(crate) struct RowParser {
 }
 
 /// Conversion of cells to readings and references.
+#[derive(Clone, Copy)]
 struct Conversion {
     front_end: Option<FrontEnd<f64>>,
     joint: Option<Joint<f64>>,

@@ -63,6 +63,10 @@ fn a_counter_wraps_between_two_streams() {
     let saved = bench.feed(&with(&["--save-state", "state.toml"]), joined(header, &rows[..50])).ok();
     let resumed = bench.feed(&with(&["--resume", "state.toml"]), joined(header, &rows[50..])).ok();
     assert_eq!([apart(&saved).1, apart(&resumed).1].concat(), whole);
+    // A device may print its header more than once.
+    let twice = joined(header, &[&[header.to_owned()], &rows[50..]].concat());
+    let again = bench.feed(&with(&["--resume", "state.toml", "--skip-bad"]), twice).ok();
+    assert_eq!([apart(&saved).1, apart(&again).1].concat(), whole);
     let seconds = bench.feed(&with(&["--resume", "state.toml"]), "time_s,resistance_ohm\n9999,1600\n");
     refused(&seconds, 4, "expected the column `time_us`, as in the stream that --resume goes on from");
 }
