@@ -42,6 +42,17 @@ pub struct BadContent {
     pub is_late: bool,
 }
 
+impl BadContent {
+    /// Names a column as it is called in the file, `to`, where the parser calls it `from`.
+    #[must_use]
+    pub fn renamed(mut self, from: &str, to: &str) -> Self {
+        if self.column.as_deref() == Some(from) {
+            self.column = Some(to.to_owned());
+        }
+        self
+    }
+}
+
 impl fmt::Display for BadContent {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(out, "{}:{}: ", self.file, self.line)?;

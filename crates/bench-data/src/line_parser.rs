@@ -63,6 +63,17 @@ pub enum Line {
     Nothing,
 }
 
+impl Line {
+    /// Returns the row of a line that is one.
+    #[must_use]
+    pub const fn row(self) -> Option<Row> {
+        match self {
+            Self::Row(row) | Self::Restarted(row) => Some(row),
+            Self::Header | Self::Nothing => None,
+        }
+    }
+}
+
 impl LineParser {
     /// Waits for a header. `name` is the source's name in errors, `overrides` replaces the stream's metadata.
     #[must_use]
@@ -201,6 +212,10 @@ impl LineParser {
         if text.is_empty() {
             return Ok(Line::Nothing);
         }
+        // A remark without `=` is no metadata of the header to come.
+        if text.starts_with('#') && !text.contains('=') {
+            return Ok(Line::Nothing);
+        }
         if text.starts_with('#') {
             return self.before_header.get_or_insert_default().take_line(text).map(|()| Line::Nothing);
         }
@@ -337,5 +352,6 @@ mod tests {
         assert!(parser.take(b"# warm now").is_ok() && parser.metadata().front_end.is_some());
         let lines = [&b"1,512"[..], b"2,512", b"3,512"].map(|line| parser.take(line));
         assert!(matches!(lines[2], Ok(Line::Restarted(row)) if row.reading.sd_ohm.is_some()), "{lines:?}");
+        assert!(parser.take(b"time_us,adc").is_ok() && parser.metadata().front_end.is_some());
     }
 }

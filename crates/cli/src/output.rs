@@ -107,15 +107,9 @@ impl Outputs {
             _ => CliError::file("write", path, &error),
         })?;
         if let Some(identity) = place.identity() {
-            let refused = |what: &str, other: &Path| {
-                let (path, other) = (path.display(), other.display());
-                CliError::Arguments(format!("cannot write {path}: it is {what} {other}; choose another name"))
-            };
-            if let Some((input, _)) = self.inputs.iter().find(|(_, input)| input == identity) {
-                return Err(refused("the input", input));
-            }
+            self.refuse_identity(path, identity)?;
             if let Some(other) = self.files.iter().find(|file| file.place.identity() == Some(identity)) {
-                return Err(refused("the output", &other.path));
+                return Err(is_another(path, "the output", &other.path));
             }
         }
         let (path, columns) = (path.to_path_buf(), columns.to_vec());
@@ -123,6 +117,21 @@ impl Outputs {
         self.check_kind(&claimed)?;
         self.files.push(claimed);
         Ok(Claim(self.files.len() - 1))
+    }
+
+    /// Refuses a file that is an input.
+    ///
+    /// # Errors
+    /// If it is one.
+    pub fn refuse_input(&self, path: &Path) -> Result<(), CliError> {
+        Identity::of(path).map_or(Ok(()), |identity| self.refuse_identity(path, &identity))
+    }
+
+    fn refuse_identity(&self, path: &Path, identity: &Identity) -> Result<(), CliError> {
+        match self.inputs.iter().find(|(_, input)| input == identity) {
+            Some((input, _)) => Err(is_another(path, "the input", input)),
+            None => Ok(()),
+        }
     }
 
     fn check_kind(&self, file: &Claimed) -> Result<(), CliError> {
@@ -199,6 +208,12 @@ impl Drop for Outputs {
             self.folders.iter().rev().for_each(|folder| drop(fs::remove_dir(folder)));
         }
     }
+}
+
+/// Returns the error of an output that is also another file of the command.
+fn is_another(path: &Path, what: &str, other: &Path) -> CliError {
+    let (path, other) = (path.display(), other.display());
+    CliError::Arguments(format!("cannot write {path}: it is {what} {other}; choose another name"))
 }
 
 /// True if a path means stdout.

@@ -99,11 +99,16 @@ impl Pacer {
     /// Repeats a spoiled step: the body goes back to the step's start, and makes it again. Returns false if there is no step.
     pub fn repeat(&mut self, time_s: f64) -> bool {
         let Some(spoiled) = self.current.take() else { return false };
-        self.ahead.push_front(spoiled.step);
-        if let Some(from) = spoiled.from {
-            let back = PacedStep { to: from, move_s: spoiled.step.move_s.max(BACK_S), hold_s: BACK_HOLD_S };
-            self.current = Some(Current { step: back, from: Some(spoiled.step.to), begun_s: time_s });
-        }
+        // The first step has no start to go back to, and begins anew.
+        let (step, from) = match spoiled.from {
+            None => (spoiled.step, None),
+            Some(from) => {
+                self.ahead.push_front(spoiled.step);
+                let back = PacedStep { to: from, move_s: spoiled.step.move_s.max(BACK_S), hold_s: BACK_HOLD_S };
+                (back, Some(spoiled.step.to))
+            }
+        };
+        self.current = Some(Current { step, from, begun_s: time_s });
         true
     }
 
@@ -231,6 +236,16 @@ mod tests {
         assert_eq!(pacer.left(), 2);
         pacer.advance(32.5);
         assert_eq!(pacer.instruction(32.5).text, "to rest in 2 s");
+    }
+
+    #[test]
+    fn the_first_step_begins_anew_if_it_is_spoiled() {
+        let mut pacer = pacer();
+        pacer.advance(0.0);
+        assert!(pacer.repeat(8.0) && pacer.left() == 3);
+        assert_eq!(pacer.instruction(8.0).text, "hold rest for 10 s");
+        assert!(!pacer.advance(17.5) && pacer.advance(18.5));
+        assert_eq!(pacer.instruction(18.5).text, "to B in 2 s");
     }
 
     #[test]

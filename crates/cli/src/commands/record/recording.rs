@@ -81,7 +81,7 @@ impl<'a> Recording<'a> {
             overrides: args.setup.metadata(&args.units),
             remarks: Vec::new(),
             columns: None,
-            writer: Writer::new(&args.output, args.force)?,
+            writer: Writer::new(&args.output, args.force, args.port.port.iter().chain([&args.protocol]))?,
             pacer,
             offset_s: 0.0,
             last: None,
@@ -213,8 +213,9 @@ impl Taker for Recording<'_> {
             return Ok(None);
         }
         if text.starts_with('#') {
-            if self.columns.is_none() {
-                self.remarks.push(text.to_owned());
+            match &mut self.columns {
+                Some(columns) => columns.remark(text),
+                None => self.remarks.push(text.to_owned()),
             }
             return Ok(None);
         }
@@ -226,8 +227,7 @@ impl Taker for Recording<'_> {
             }
             return Ok(None);
         };
-        if columns.is_header(text) {
-            columns.restart();
+        if columns.restart(text).map_err(|what| CliError::Input(format!("{}: {what}", self.name)))? {
             return Ok(None);
         }
         match columns.row(text) {

@@ -3,6 +3,7 @@ use std::io::{self, ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use crate::error::CliError;
+use crate::output::Outputs;
 
 /// A recording that is being written, with whole rows at any time. Rows of the present step can still lose their strain.
 pub struct Writer {
@@ -15,11 +16,12 @@ pub struct Writer {
 }
 
 impl Writer {
-    /// Creates the file.
+    /// Creates the file of a command that reads `inputs`.
     ///
     /// # Errors
-    /// If it exists and is not to be replaced, or cannot be created.
-    pub fn new(path: &Path, force: bool) -> Result<Self, CliError> {
+    /// If it exists and is not to be replaced, is an input, or cannot be created.
+    pub fn new<'a>(path: &Path, force: bool, inputs: impl IntoIterator<Item = &'a PathBuf>) -> Result<Self, CliError> {
+        Outputs::new(force, inputs).refuse_input(path)?;
         let file = if force {
             OpenOptions::new().write(true).create(true).truncate(true).open(path)
         } else {
@@ -75,9 +77,12 @@ impl Writer {
         Ok(())
     }
 
-    /// Appends text without a buffer, so that the file has whole rows however the program ends.
+    /// Appends text without a buffer, so that the file has whole rows however the program ends, also on a full disk.
     fn append(&mut self, text: &str) -> Result<(), CliError> {
-        self.file.write_all(text.as_bytes()).map_err(|error| self.failed(&error))?;
+        if let Err(error) = self.file.write_all(text.as_bytes()) {
+            let _ = self.file.set_len(self.end);
+            return Err(self.failed(&error));
+        }
         self.end += text.len() as u64;
         Ok(())
     }
@@ -96,7 +101,7 @@ mod tests {
     fn a_spoiled_step_keeps_its_readings() {
         let folder = TempDir::new().unwrap();
         let path = folder.path().join("trace.csv");
-        let mut writer = Writer::new(&path, false).unwrap();
+        let mut writer = Writer::new(&path, false, []).unwrap();
         writer.head("t,r,strain,strain_sd\n").unwrap();
         writer.row("0,1".into(), "0,0.01").unwrap();
         writer.settle();
@@ -106,6 +111,6 @@ mod tests {
         writer.row("3,4".into(), "0,0.01").unwrap();
         let text = std::fs::read_to_string(&path).unwrap();
         assert_eq!(text, "t,r,strain,strain_sd\n0,1,0,0.01\n1,2,,\n2,3,,\n3,4,0,0.01\n");
-        assert!(Writer::new(&path, false).is_err() && Writer::new(&path, true).is_ok());
+        assert!(Writer::new(&path, false, []).is_err() && Writer::new(&path, true, []).is_ok());
     }
 }
