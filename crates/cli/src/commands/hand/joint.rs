@@ -5,7 +5,7 @@ use ohmstrain::{
     Error, Estimate, Filter, FilterBuilder, FusedEstimate, FusedFilter, FusedSensor, Quantity, Reading, ReadingUnit,
     Sensor, UnitGuess,
 };
-use ohmstrain_bench_data::{LineParser, Metadata};
+use ohmstrain_bench_data::{BadContent, LineParser, Metadata};
 
 use crate::channels::masked;
 use crate::error::CliError;
@@ -203,14 +203,15 @@ impl<'a> Channel<'a> {
     }
 
     /// Returns the header for this channel: its column is the reading, those of other channels are ignored.
-    pub fn header(&self, header: &str) -> Result<String, String> {
-        let has = |column: &str| header.split(',').any(|name| name.trim() == column);
+    pub fn header(&self, names: &[String]) -> Result<String, String> {
+        let has = |column: &str| names.iter().any(|name| name == column);
+        let header = || quoted(&names.join(","));
         if !has("time_s") && !has("time_us") {
-            return Err(format!("expected a header with the column `time_s` or `time_us`, found {}", quoted(header)));
+            return Err(format!("expected a header with the column `time_s` or `time_us`, found {}", header()));
         }
         let (joint, column) = (self.joint, &self.entry.column);
         if !has(column) {
-            return Err(format!("joint `{joint}`: expected a column `{column}`, found {}", quoted(header)));
+            return Err(format!("joint `{joint}`: expected a column `{column}`, found {}", header()));
         }
         let expected = self.sensor.params().reading;
         if let Some(found) = self.stated_unit().filter(|found| *found != expected) {
@@ -220,12 +221,23 @@ impl<'a> Channel<'a> {
                 reading_column(found)
             ));
         }
-        let own = if self.entry.front_end.is_some() { "adc" } else { reading_column(expected) };
-        Ok(masked(header.split(',').map(str::trim), |_, name| match name {
+        let own = self.own_column();
+        Ok(masked(names.iter().map(String::as_str), |_, name| match name {
             name if name == column => Some(own),
             "time_s" | "time_us" => Some(name),
             _ => None,
         }))
+    }
+
+    /// Returns the column of its readings in a recording of one channel.
+    fn own_column(&self) -> &'static str {
+        if self.entry.front_end.is_some() { "adc" } else { reading_column(self.sensor.params().reading) }
+    }
+
+    /// Returns the message about a line that it cannot read, with its column as in the file.
+    pub fn refused(&self, fault: BadContent, hint: &str) -> String {
+        let fault = fault.renamed(self.own_column(), &self.entry.column);
+        format!("{fault}{hint}")
     }
 
     /// Returns the unit of the readings according to the electronics, the lines above the header or the ending of the column's

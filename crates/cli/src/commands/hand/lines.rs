@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
-use ohmstrain_bench_data::{Line, ParquetText, Row};
+use ohmstrain_bench_data::{Line, LineParser, ParquetText, Row, cells};
 
 use super::joint::{Channel, Joint};
 use crate::error::CliError;
@@ -29,7 +29,7 @@ pub struct Taken {
 
 /// Parser of all channels' lines.
 pub struct HandParser {
-    header: Option<String>,
+    has_header: bool,
     /// True for a stream of a device: it may be joined within a line, and its header may come again.
     is_stream: bool,
     /// Advice where the clock has restarted.
@@ -39,7 +39,7 @@ pub struct HandParser {
 impl HandParser {
     /// Creates a parser that waits for a header; `late` is advice where the clock has restarted.
     pub fn new(is_stream: bool, late: &'static str) -> Self {
-        Self { header: None, is_stream, late }
+        Self { has_header: false, is_stream, late }
     }
 
     /// Parses a line; `place` is its place in messages.
@@ -48,49 +48,55 @@ impl HandParser {
     /// If a header lacks a channel's column.
     pub fn take(&mut self, line: &[u8], place: &str, joints: &mut [Joint]) -> Result<Taken, CliError> {
         let text = String::from_utf8_lossy(line);
-        let is_first = self.header.is_none() && !text.starts_with('#') && !text.trim().is_empty();
-        let is_header = is_first || (self.is_stream && self.header.as_deref() == Some(text.trim()));
-        let mut taken = Taken { is_first, restarted: is_header && !is_first, ..Taken::default() };
-        for channel in channels(joints) {
-            let result = if is_header {
-                match channel.header(text.trim()) {
-                    Ok(own) => channel.lines.take(own.as_bytes()),
-                    // The rest of a line, as after opening a port late, is no header.
-                    Err(what) if self.is_stream && !has_time(&text) => {
-                        return Ok(Taken { refused: Some(format!("{place}: {what}")), ..Taken::default() });
-                    }
-                    Err(what) => return Err(CliError::Input(format!("{place}: {what}"))),
-                }
-            } else {
-                channel.lines.take(line)
-            };
-            match result {
-                Ok(Line::Row(row)) => taken.rows.push(row),
-                Ok(Line::Restarted(row)) => {
-                    taken.rows.push(row);
-                    taken.restarted = true;
-                }
-                Ok(_) => {}
-                Err(fault) => {
-                    let hint = if fault.is_late { self.late } else { "" };
-                    taken.refused = Some(format!("joint `{}`: {fault}{hint}", channel.joint));
-                }
+        let text = text.trim_start_matches('\u{feff}').trim();
+        if text.is_empty() || text.starts_with('#') {
+            return Ok(self.rows(line, joints));
+        }
+        let names = cells(text).unwrap_or_default();
+        let has_time = names.iter().any(|name| name == "time_s" || name == "time_us");
+        let is_first = !self.has_header;
+        if !is_first && !(self.is_stream && has_time) {
+            return Ok(self.rows(line, joints));
+        }
+        let headers: Result<Vec<String>, String> = channels(joints).map(|channel| channel.header(&names)).collect();
+        match headers {
+            Ok(headers) => self.begin(&headers, joints, is_first),
+            // The rest of a line, as after opening a port late, is no header.
+            Err(what) if self.is_stream && !(is_first && has_time) => {
+                Ok(Taken { refused: Some(format!("{place}: {what}")), ..Taken::default() })
+            }
+            Err(what) => Err(CliError::Input(format!("{place}: {what}"))),
+        }
+    }
+
+    /// Begins with a header, in the form for each channel; one that comes again may have its columns in another order.
+    fn begin(&mut self, headers: &[String], joints: &mut [Joint], is_first: bool) -> Result<Taken, CliError> {
+        let mut taken = Taken { is_first, restarted: !is_first, ..Taken::default() };
+        for (channel, header) in channels(joints).zip(headers) {
+            if let Err(fault) = channel.lines.take(header.as_bytes()) {
+                taken.refused = Some(channel.refused(fault, ""));
             }
         }
-        if is_first && taken.refused.is_none() {
-            self.header = Some(text.trim().to_owned());
-        }
-        // A line that one channel cannot read is a row for none.
-        if taken.refused.is_some() || taken.rows.len() < channels(joints).count() {
-            taken.rows.clear();
-        }
+        self.has_header |= taken.refused.is_none();
         Ok(taken)
     }
-}
 
-/// True if a line names a column of times.
-fn has_time(text: &str) -> bool {
-    text.split(',').any(|cell| matches!(cell.trim(), "time_s" | "time_us"))
+    /// Parses a line that is no header.
+    fn rows(&self, line: &[u8], joints: &mut [Joint]) -> Taken {
+        let parsers = channels(joints).map(|channel| &mut channel.lines);
+        match LineParser::take_together(parsers, line) {
+            Ok(lines) => Taken {
+                restarted: lines.iter().any(|line| matches!(line, Line::Restarted(_))),
+                rows: lines.into_iter().filter_map(Line::row).collect(),
+                ..Taken::default()
+            },
+            Err((index, fault)) => {
+                let hint = if fault.is_late { self.late } else { "" };
+                let refused = channels(joints).nth(index).map(|channel| channel.refused(fault, hint));
+                Taken { refused, ..Taken::default() }
+            }
+        }
+    }
 }
 
 /// Returns the channels of all joints.

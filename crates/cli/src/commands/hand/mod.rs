@@ -111,7 +111,8 @@ fn stream<W: Write>(
                 doubt(channel.doubt(row.reading.value), lines, messages)?;
             }
             let time_s = taken.rows[0].time_s;
-            let estimates = step(joints, &taken.rows)?;
+            let at = |error| CliError::Input(format!("{}: {error}", lines.place()));
+            let estimates = step(joints, &taken.rows).map_err(at)?;
             write(time_s, &estimates.iter().collect::<Vec<_>>(), out)?;
             written += 1;
             if lines.is_live {
