@@ -313,7 +313,7 @@ fn a_pipe_is_reopened_when_another_program_writes_into_it() {
         let rows: String = (first..first + 5).map(|row| format!("{}.{},1600\n", row / 10, row % 10)).collect();
         std::fs::write(&pipe, rows).unwrap();
         terminal.wait_for(words);
-        terminal.wait_for("the readings have ended");
+        terminal.wait_for("the other end has closed it");
     }
     terminal.press("z");
     terminal.wait_for("R0 is 1600 now, the median of 10 readings");

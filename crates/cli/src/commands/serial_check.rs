@@ -108,6 +108,7 @@ fn listen(args: &SerialCheckArgs) -> Result<Received, CliError> {
             Event::Line(line, _) => line,
             Event::Connected => continue,
             Event::Ended => break,
+            Event::Failed(error) => return Err(CliError::Other(format!("cannot read {name}: {error}"))),
             Event::Away(why) => return Err(CliError::Other(format!("cannot read {name}: {why}"))),
         };
         match BoardStep::of(&line) {

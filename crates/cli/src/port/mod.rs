@@ -44,6 +44,8 @@ pub trait Taker {
 /// Rows of a port; those of a recording at the pace at which it was recorded.
 pub struct Feed<T> {
     opened: Instant,
+    /// Name in messages.
+    name: String,
     source: Source,
     pace: Option<Pace>,
     /// A row that is not due yet.
@@ -67,7 +69,7 @@ impl<T> Feed<T> {
             (None, None) => Source::open(args.port.as_deref().unwrap_or(Path::new("-")), args.baud)?,
         };
         let pace = source.is_recording.then_some(Pace { speed: args.speed, started: None });
-        Ok(Self { opened, source, pace, held: None, status: "waiting".into(), has_ended: false })
+        Ok(Self { opened, name: args.source(), source, pace, held: None, status: "waiting".into(), has_ended: false })
     }
 
     /// Passes on the rows that have arrived and are due, for a short while.
@@ -86,7 +88,11 @@ impl<T> Feed<T> {
             }
             match self.source.events.try_recv() {
                 Ok(event) => self.handle(event, taker)?,
-                Err(TryRecvError::Empty | TryRecvError::Disconnected) => return Ok(()),
+                Err(TryRecvError::Empty) => return Ok(()),
+                Err(TryRecvError::Disconnected) => {
+                    self.has_ended = true;
+                    return Ok(());
+                }
             }
         }
         Ok(())
@@ -108,7 +114,11 @@ impl<T> Feed<T> {
         }
         match self.source.events.recv_timeout(longest) {
             Ok(event) => self.handle(event, taker),
-            Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => Ok(()),
+            Err(RecvTimeoutError::Timeout) => Ok(()),
+            Err(RecvTimeoutError::Disconnected) => {
+                self.has_ended = true;
+                Ok(())
+            }
         }
     }
 
@@ -119,6 +129,9 @@ impl<T> Feed<T> {
             }
             Event::Connected => self.status = "connected".into(),
             Event::Away(why) => self.status = format!("waiting for the port: {why}"),
+            Event::Failed(error) => {
+                return Err(CliError::Other(format!("cannot read {}: {error}", self.name)));
+            }
             Event::Ended => {
                 self.status = "the readings have ended".into();
                 self.has_ended = true;

@@ -5,7 +5,7 @@ use std::net::{TcpListener, TcpStream, UdpSocket};
 use std::sync::mpsc::SyncSender;
 use std::thread;
 
-use super::source::{Event, Lines, RETRY, read_to_end};
+use super::source::{Event, Lines, RETRY, read_connection};
 use crate::error::CliError;
 
 /// Largest datagram.
@@ -74,11 +74,11 @@ pub fn read_tcp(address: &str, send: SyncSender<Event>) -> Result<(), CliError> 
 /// Reads one connection after another, as long as there is a receiver.
 fn take_turns(next: impl Fn() -> io::Result<TcpStream>, send: &SyncSender<Event>) {
     loop {
-        let (read, away) = match next() {
-            Ok(mut stream) => (read_to_end(&mut stream, send), "the other end has closed the connection".to_owned()),
-            Err(error) => (Ok(()), error.to_string()),
+        let read = match next() {
+            Ok(mut stream) => read_connection(&mut stream, send),
+            Err(error) => send.send(Event::Away(error.to_string())),
         };
-        if read.and_then(|()| send.send(Event::Away(away))).is_err() {
+        if read.is_err() {
             return;
         }
         thread::sleep(RETRY);

@@ -26,8 +26,10 @@ pub enum Event {
     Connected,
     /// The port is gone, or not there yet, with the reason.
     Away(String),
-    /// End of the source.
+    /// End of a recording or of standard input.
     Ended,
+    /// A recording or standard input that cannot be read.
+    Failed(io::Error),
 }
 
 /// A source of lines.
@@ -62,7 +64,7 @@ impl Source {
                 let what = "--port -: stdin is the terminal: pipe readings into it, or name a port or a recording";
                 return Err(CliError::Arguments(what.into()));
             }
-            thread::spawn(move || drop(read_to_end(&mut io::stdin().lock(), &send)));
+            thread::spawn(move || drop(read_once(&mut io::stdin().lock(), &send)));
         } else if is_recording || path.is_dir() {
             let unreadable = |error| CliError::file("read", path, &error);
             let mut file = File::open(path).map_err(unreadable)?;
@@ -77,10 +79,16 @@ impl Source {
                 )));
             }
             file.rewind().map_err(unreadable)?;
-            thread::spawn(move || drop(read_to_end(&mut file, &send)));
+            thread::spawn(move || drop(read_once(&mut file, &send)));
         } else if is_pipe(path) {
-            let path = path.to_path_buf();
-            thread::spawn(move || read_pipe(&path, &send));
+            // One without a name, as of `<(command)`, comes once.
+            if path.canonicalize().is_err() {
+                let mut pipe = File::open(path).map_err(|error| CliError::file("read", path, &error))?;
+                thread::spawn(move || drop(read_once(&mut pipe, &send)));
+            } else {
+                let path = path.to_path_buf();
+                thread::spawn(move || read_pipe(&path, &send));
+            }
         } else {
             let path = path.to_path_buf();
             thread::spawn(move || read_port(&path, baud, &send));
@@ -100,20 +108,33 @@ fn is_pipe(_: &Path) -> bool {
     false
 }
 
-/// Reads as long as there is a receiver.
-pub(super) fn read_to_end(source: &mut dyn Read, send: &SyncSender<Event>) -> Result<(), SendError<Event>> {
+/// Reads a source that comes once, as long as there is a receiver.
+fn read_once(source: &mut dyn Read, send: &SyncSender<Event>) -> Result<(), SendError<Event>> {
+    let ended = read_to_end(source, send)?;
+    send.send(ended.map_or_else(Event::Failed, |()| Event::Ended))
+}
+
+/// Reads a connection that another one may follow, as long as there is a receiver.
+pub(super) fn read_connection(source: &mut dyn Read, send: &SyncSender<Event>) -> Result<(), SendError<Event>> {
+    let ended = read_to_end(source, send)?;
+    let why = ended.map_or_else(|error| error.to_string(), |()| "the other end has closed it".to_owned());
+    send.send(Event::Away(why))
+}
+
+/// Reads as long as there is a receiver; returns the error of the source.
+fn read_to_end(source: &mut dyn Read, send: &SyncSender<Event>) -> Result<io::Result<()>, SendError<Event>> {
     let mut lines = Lines::default();
     send.send(Event::Connected)?;
-    let failed = loop {
+    let ended = loop {
         match lines.read(source, send) {
-            Err(Stop::NoReceiver) => return Ok(()),
-            Err(Stop::Failed(error)) => break Some(error),
-            Ok(0) => break None,
+            Err(Stop::NoReceiver(unsent)) => return Err(unsent),
+            Err(Stop::Failed(error)) => break Err(error),
+            Ok(0) => break Ok(()),
             Ok(_) => {}
         }
     };
     lines.finish(send)?;
-    send.send(failed.map_or(Event::Ended, |error| Event::Away(error.to_string())))
+    Ok(ended)
 }
 
 /// Reads a pipe again and again: another program may write into it after one has ended.
@@ -121,7 +142,7 @@ fn read_pipe(path: &Path, send: &SyncSender<Event>) {
     loop {
         // Opening it waits for a writer.
         let read = match File::open(path) {
-            Ok(mut file) => read_to_end(&mut file, send),
+            Ok(mut file) => read_connection(&mut file, send),
             Err(error) => send.send(Event::Away(error.to_string())),
         };
         if read.is_err() {
@@ -142,7 +163,7 @@ fn read_port(path: &Path, baud: u32, send: &SyncSender<Event>) {
                 let _ = send.send(Event::Connected);
                 loop {
                     match lines.read(&mut port, send) {
-                        Err(Stop::NoReceiver) => return,
+                        Err(Stop::NoReceiver(_)) => return,
                         Err(Stop::Failed(error)) => break error.to_string(),
                         Ok(0) => break "it was unplugged".into(),
                         Ok(_) => {}
@@ -160,14 +181,14 @@ fn read_port(path: &Path, baud: u32, send: &SyncSender<Event>) {
 /// Reason why reading stopped.
 pub(super) enum Stop {
     /// The receiver is gone.
-    NoReceiver,
+    NoReceiver(SendError<Event>),
     /// The source failed.
     Failed(io::Error),
 }
 
 impl From<SendError<Event>> for Stop {
-    fn from(_: SendError<Event>) -> Self {
-        Self::NoReceiver
+    fn from(unsent: SendError<Event>) -> Self {
+        Self::NoReceiver(unsent)
     }
 }
 
