@@ -42,8 +42,11 @@ pub fn run(args: &ExportArgs) -> Result<(), CliError> {
     let mut outputs = Outputs::new(args.force, std::iter::once(&args.sensor).chain(&args.score));
     put(&mut outputs, &args.output, files)?;
     // Printed after the outputs are claimed and before anything is written to them: it may refuse.
-    print_promise(args, &lines, &promise, worse_on)?;
-    outputs.publish()
+    match print_promise(args, &lines, &promise, worse_on) {
+        // The files are written even if nobody reads what is printed.
+        Ok(()) | Err(CliError::ClosedPipe) => outputs.publish(),
+        refused => refused,
+    }
 }
 
 /// Puts files of source code below a folder.

@@ -85,7 +85,7 @@ pub fn print_promise(
     promise: &Promise,
     worse_on: Option<&str>,
 ) -> Result<(), CliError> {
-    print(|out| {
+    let printed = print(|out| {
         for line in candidates.iter().chain(&promise.lines) {
             writeln!(out, "{line}")?;
         }
@@ -95,11 +95,11 @@ pub fn print_promise(
             ExportTarget::Rust => " of the same in C",
         };
         Ok(writeln!(out, "{}; instructions a step of a Cortex-M4F{of}, estimated as is the rest", promise.words)?)
-    })?;
+    });
     match worse_on {
         Some(name) if !args.force => Err(CliError::Input(format!(
             "{name}: what would be exported is worse than a static cubic here; --force exports it"
         ))),
-        _ => Ok(()),
+        _ => printed,
     }
 }

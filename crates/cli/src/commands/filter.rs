@@ -14,7 +14,7 @@ use crate::error::CliError;
 use crate::estimates::{self, EstimateWriter};
 use crate::filter_state;
 use crate::messages::Messages;
-use crate::output::{Kind, RowsOut};
+use crate::output::{Kind, Outputs, RowsOut};
 use crate::readings::{late, no_row};
 use crate::run::{builder, builder_anew, rest_resistance};
 use crate::sensor_file;
@@ -27,6 +27,9 @@ pub fn run(args: &FilterArgs, messages: &Messages) -> Result<u64, CliError> {
     let kind = args.estimate.estimator.chosen();
     let WrittenArgs { output, replace, columns, .. } = &args.written;
     let inputs = [&args.trace_file, &args.estimate.sensor];
+    // The state that the stream continues from is replaced by the next state alone.
+    let state = Outputs::new(replace.force, &args.resume);
+    output.as_deref().map_or(Ok(()), |path| state.refuse_input(path))?;
     let mut rows_out = RowsOut::claim(output.as_deref(), columns, replace.force, inputs)?;
     let claim = args.save_state.as_deref().map(|path| rows_out.outputs.claim(path, Kind::State)).transpose()?;
     let mut sensor = sensor_file::read(&args.estimate.sensor, kind)?;
@@ -203,12 +206,18 @@ impl<'a, W: io::Write + Send> Stream<'a, W> {
             suits::warn_of_unused(&self.args.estimate.known, times, &self.sink.file, self.sink.messages);
             self.sink.unlike.warn(&self.sink.file, self.sink.messages);
         }
-        let saves = self.args.save_state.is_some() && streamed.is_ok();
+        // The estimates may have lost their reader. The clock is then that of the last filtered row, if none was read ahead.
+        let is_closed = matches!(streamed, Err(CliError::ClosedPipe)) && first.len() == 0;
+        let saves = self.args.save_state.is_some() && (streamed.is_ok() || is_closed);
         // Pending rows get their estimates whatever stopped the stream, and finished estimates remain valid.
         let finished = if saves { Ok(()) } else { self.finish() };
         let state = saves.then(|| self.state(&rows)).transpose()?;
-        let written = self.sink.writer.finish()?;
-        streamed.and(finished).map(|()| (written, state))
+        let written = match self.sink.writer.finish() {
+            Err(CliError::ClosedPipe) if saves => return Ok((0, state)),
+            written => written?,
+        };
+        let ended = if saves { Ok(()) } else { streamed.and(finished) };
+        ended.map(|()| (written, state))
     }
 
     /// Returns the state from which the next row can resume.

@@ -1,4 +1,4 @@
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use ohmstrain_bench_data::simulate::{Followed, Protocol, SimulationSettings, simulate};
 
@@ -22,7 +22,7 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
         followed: followed(args)?,
         ..SimulationSettings::new(args.material, protocol(args)?)
     };
-    write(&settings, args.output.as_deref(), &args.replace)
+    write(&settings, args.output.as_deref(), &args.replace, args.follow.as_ref())
 }
 
 /// Returns the bench's protocol, of the length that was asked for.
@@ -55,13 +55,18 @@ fn followed(args: &SimulateArgs) -> Result<Option<Followed>, CliError> {
 
 /// Writes the recording of the demo.
 pub fn example(args: &ExampleArgs) -> Result<(), CliError> {
-    write(&SimulationSettings::example(), args.output.as_deref(), &args.replace)
+    write(&SimulationSettings::example(), args.output.as_deref(), &args.replace, None)
 }
 
 /// Simulates and writes a recording, to stdout if no file is given. The file is claimed first, so that a foreign one is refused
 /// before any work.
-fn write(settings: &SimulationSettings, file: Option<&Path>, replace: &ReplaceArgs) -> Result<(), CliError> {
-    let mut outputs = Outputs::new(replace.force, []);
+fn write(
+    settings: &SimulationSettings,
+    file: Option<&Path>,
+    replace: &ReplaceArgs,
+    input: Option<&PathBuf>,
+) -> Result<(), CliError> {
+    let mut outputs = Outputs::new(replace.force, input);
     let output = outputs.claim_or_stdout(file, Kind::Simulation)?;
     let bytes = bytes(settings).map_err(CliError::Arguments)?;
     outputs.publish_or_print(output, bytes)

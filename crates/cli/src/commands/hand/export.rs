@@ -8,7 +8,7 @@ use ohmstrain_export::{Divider, ExportTarget, HandChannel, HandFirmware, HandJoi
 use ohmstrain_model::SensorSide;
 
 use super::description;
-use super::joint::Joint;
+use super::joint::{Channel, Joint};
 use super::{OF_ONE_SENSOR, joints, refuse_flags};
 use crate::args::ExportArgs;
 use crate::commands::export::put;
@@ -34,13 +34,14 @@ pub fn run(args: &ExportArgs, hand: &Path) -> Result<(), CliError> {
     let steps: Vec<f64> = channels(&joints).map(usual).collect::<Result<_, _>>()?;
     // The slowest channel has the longest step.
     let dt_s = steps.into_iter().fold(0.0, f64::max);
-    let exported: Vec<HandJoint> = joints.iter().map(exported).collect();
+    let exported: Result<Vec<HandJoint>, String> = joints.iter().map(exported).collect();
+    let exported = exported.map_err(|what| CliError::Input(format!("{}: {what}", hand.display())))?;
     let firmware = HandFirmware::new(&exported, dt_s, &args.prefix).map_err(refused)?;
     let files = description.files(hand);
     let mut outputs = Outputs::new(args.force, &files);
     put(&mut outputs, &args.output, firmware.files)?;
-    print(|out| firmware.costs.iter().try_for_each(|line| Ok(writeln!(out, "{line}")?)))?;
-    outputs.publish()
+    outputs.publish()?;
+    print(|out| firmware.costs.iter().try_for_each(|line| Ok(writeln!(out, "{line}")?)))
 }
 
 fn channels<'j>(joints: &'j [Joint]) -> impl Iterator<Item = &'j SensorParams> {
@@ -48,23 +49,32 @@ fn channels<'j>(joints: &'j [Joint]) -> impl Iterator<Item = &'j SensorParams> {
 }
 
 /// Returns a joint in the form that is exported.
-fn exported<'j>(joint: &'j Joint) -> HandJoint<'j> {
-    let channel = |one: &'j super::joint::Channel| HandChannel {
-        column: one.entry.column.clone(),
-        params: one.sensor.params(),
-        rest_resistance: one.rest_resistance,
-        divider: match one.entry.front_end {
-            Some(FrontEndSpec::Divider { reference_ohm, side, bits, .. }) => {
-                let full = f64::from(bits).exp2() - 1.0;
-                Some(Divider { reference_ohm, is_high: side == SensorSide::High, full })
-            }
-            _ => None,
-        },
+fn exported<'j>(joint: &'j Joint) -> Result<HandJoint<'j>, String> {
+    let channel = |one: &'j Channel| {
+        Ok(HandChannel {
+            column: one.entry.column.clone(),
+            params: one.sensor.params(),
+            rest_resistance: one.rest_resistance,
+            divider: one.entry.front_end.map(|spec| divider(&one.entry.column, spec)).transpose()?,
+        })
     };
-    HandJoint {
+    Ok(HandJoint {
         name: joint.name.into(),
-        channels: joint.channels.iter().map(channel).collect(),
+        channels: joint.channels.iter().map(channel).collect::<Result<_, String>>()?,
         fusion: joint.fusion.as_ref().map(FusedSensor::params),
         joint: joint.channels.iter().find_map(|channel| channel.sensor.params().joint),
+    })
+}
+
+/// Returns the divider of a column, which the sketch measures.
+fn divider(column: &str, spec: FrontEndSpec) -> Result<Divider, String> {
+    match spec {
+        FrontEndSpec::Divider { reference_ohm, side, bits, .. } => {
+            Ok(Divider { reference_ohm, is_high: side == SensorSide::High, full: f64::from(bits).exp2() - 1.0 })
+        }
+        other => Err(format!(
+            "column `{column}`: expected a divider, which the exported sketch measures, found `{other}`; without `front_end` the sketch is \
+             exported for a divider, whose `ohm_at` is then to be replaced"
+        )),
     }
 }
