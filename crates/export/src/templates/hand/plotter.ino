@@ -41,10 +41,16 @@ float ohm_at(uint8_t channel, float at) {
   return R_SERIES[channel] * (IS_HIGH[channel] ? 1.0f / ratio : ratio);
 }
 
-// Reading for the filter of a channel.
-float reading_of(uint8_t channel) {
-  const float ohm = ohm_at(channel, level(channel));
-  return RESTED[channel] > 0.0f ? RESTED[channel] * ohm / rest_ohm[channel] : ohm;
+// Standard deviation of a resistance by the steps of the converter, ohm; 0 if the sensor is not connected. Without it, equal codes
+// of a sensor at rest count as a stuck reading.
+float sd_of(uint8_t channel, float ohm) {
+  const float whole = ohm + R_SERIES[channel];
+  return ohm > 0.0f && ohm < 1e9f ? 0.29f * whole * whole / (R_SERIES[channel] * FULL[channel]) : 0.0f;
+}
+
+// Reading for the filter of a channel, per ohm; NAN for one that was calibrated with ratios and has not been measured at rest.
+float per_ohm(uint8_t channel) {
+  return RESTED[channel] > 0.0f ? RESTED[channel] / rest_ohm[channel] : 1.0f;
 }
 
 // Resistance of a rested sensor, ohm, from the mean of 64 levels; NAN if it is not connected.
@@ -82,15 +88,17 @@ void setup() {
 void loop() {
   static const char *const NAME[OHMSTRAIN_JOINTS] = {{% for joint in joints %}"<< joint.name >>"{% if not loop.last %}, {% endif %}{% endfor %}};
   static ohmstrain_estimate estimate[OHMSTRAIN_JOINTS];
-  float reading[OHMSTRAIN_CHANNELS];
+  float reading[OHMSTRAIN_CHANNELS], reading_sd[OHMSTRAIN_CHANNELS];
   const uint32_t now_us = micros();
   if (now_us - last_us < PERIOD_US) {
     return;
   }
   for (uint8_t k = 0; k < OHMSTRAIN_CHANNELS; k++) {
-    reading[k] = reading_of(k);
+    const float ohm = ohm_at(k, level(k)), scale = per_ohm(k);
+    reading[k] = scale * ohm;
+    reading_sd[k] = scale > 0.0f ? scale * sd_of(k, ohm) : 0.0f;
   }
-  ohmstrain_step_after(&state, 1e-6f * static_cast<float>(now_us - last_us), reading, nullptr);
+  ohmstrain_step_after(&state, 1e-6f * static_cast<float>(now_us - last_us), reading, reading_sd);
   last_us = now_us;
   ohmstrain_get(&state, estimate);
   for (uint8_t k = 0; k < OHMSTRAIN_JOINTS; k++) {
