@@ -18,7 +18,7 @@ use serde::Serialize;
 pub use kind::{IMPORT, Kind, MANUAL, SIMULATE, is_of_a_hand, is_this_program};
 use place::Identity;
 pub use place::{Destination, HEAD};
-pub use rows::RowsOut;
+pub use rows::{RowsOut, append_whole};
 use unfinished::Unfinished;
 pub use unfinished::UnfinishedFolder;
 pub use wide::{COLUMNS, named, table, wrapped, wrapped_table};

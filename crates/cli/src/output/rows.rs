@@ -50,6 +50,19 @@ impl RowsOut {
     }
 }
 
+/// Appends rows to a file of `end` bytes; if it has no room for them, it keeps its whole rows.
+///
+/// # Errors
+/// If they cannot be written.
+pub fn append_whole(file: &mut File, end: &mut u64, rows: &[u8]) -> io::Result<()> {
+    let written = file.write_all(rows);
+    match written {
+        Ok(()) => *end += rows.len() as u64,
+        Err(_) => drop(file.set_len(*end)),
+    }
+    written
+}
+
 /// A file that adds its path to errors.
 struct Named {
     file: File,

@@ -1,11 +1,12 @@
 //! Recording while the view runs: a trace with a column of marks.
 
 use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use ohmstrain_bench_data::{Metadata, RowWriter, counted};
 
+use crate::output::append_whole;
 use ohmstrain::MADE_BY;
 
 /// Largest number of file names that are tried.
@@ -13,7 +14,9 @@ const MOST_FILES: u32 = 10_000;
 
 /// A recording that is being written.
 pub struct Recorder {
-    rows: RowWriter<BufWriter<File>>,
+    file: File,
+    /// Length of the file.
+    end: u64,
     /// Path of the file.
     pub path: PathBuf,
     /// Number of rows so far.
@@ -34,12 +37,12 @@ impl Recorder {
         let (path, mut file) = new_file(prefix)?;
         // The maker of a recording that is played back did not make this one.
         metadata.other.retain(|(key, _)| key != "made_by");
-        write!(file, "# made_by = {MADE_BY} live\n{metadata}")?;
-        let mut rows = RowWriter::new(BufWriter::new(file));
+        let mut rows = RowWriter::new(format!("# made_by = {MADE_BY} live\n{metadata}").into_bytes());
         std::iter::once("time_s").chain(columns).chain(["mark"]).for_each(|name| rows.text(name));
         rows.end()?;
-        rows.flush()?;
-        Ok(Self { rows, path, count: 0 })
+        let mut end = 0;
+        append_whole(&mut file, &mut end, &rows.into_inner())?;
+        Ok(Self { file, end, path, count: 0 })
     }
 
     /// Writes a row, and the number of its mark, if it has one.
@@ -47,13 +50,15 @@ impl Recorder {
     /// # Errors
     /// If it cannot be written.
     pub fn write(&mut self, time_s: f64, values: impl Iterator<Item = f64>, mark: Option<u32>) -> io::Result<()> {
-        self.rows.number(time_s);
-        values.for_each(|value| self.rows.number(value));
-        self.rows.number(mark.map_or(f64::NAN, f64::from));
+        let mut row = RowWriter::new(Vec::new());
+        row.number(time_s);
+        values.for_each(|value| row.number(value));
+        row.number(mark.map_or(f64::NAN, f64::from));
+        row.end()?;
+        // Without a buffer, so that the file has whole rows however the program ends.
+        append_whole(&mut self.file, &mut self.end, &row.into_inner())?;
         self.count += 1;
-        self.rows.end()?;
-        // Flushed, so that the file has whole rows however the program ends.
-        self.rows.flush()
+        Ok(())
     }
 }
 

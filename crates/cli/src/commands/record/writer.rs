@@ -1,9 +1,9 @@
 use std::fs::{File, OpenOptions};
-use std::io::{self, ErrorKind, Seek, SeekFrom, Write};
+use std::io::{self, ErrorKind, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use crate::error::CliError;
-use crate::output::Outputs;
+use crate::output::{Outputs, append_whole};
 
 /// A recording that is being written, with whole rows at any time. Rows of the present step can still lose their strain.
 pub struct Writer {
@@ -79,12 +79,7 @@ impl Writer {
 
     /// Appends text without a buffer, so that the file has whole rows however the program ends, also on a full disk.
     fn append(&mut self, text: &str) -> Result<(), CliError> {
-        if let Err(error) = self.file.write_all(text.as_bytes()) {
-            let _ = self.file.set_len(self.end);
-            return Err(self.failed(&error));
-        }
-        self.end += text.len() as u64;
-        Ok(())
+        append_whole(&mut self.file, &mut self.end, text.as_bytes()).map_err(|error| self.failed(&error))
     }
 
     fn failed(&self, error: &io::Error) -> CliError {
