@@ -98,6 +98,7 @@ fn groups(tables: &[Table], stem: &str) -> Result<Vec<Group>, CliError> {
     let first = tables.first().map_or_else(|| Ok(Vec::new()), Table::channels)?;
     for table in tables {
         let found = table.channels()?;
+        refuse_double(table, &found)?;
         if found != first {
             let names =
                 |channels: &[Channel]| channels.iter().map(|one| one.column.as_str()).collect::<Vec<_>>().join(", ");
@@ -119,6 +120,21 @@ fn groups(tables: &[Table], stem: &str) -> Result<Vec<Group>, CliError> {
         groups[place].channels.push(channel);
     }
     Ok(groups)
+}
+
+/// Refuses two channels of one name: a sensor file is called like its channel.
+fn refuse_double(table: &Table, channels: &[Channel]) -> Result<(), CliError> {
+    let other = |(k, channel): (usize, &Channel)| {
+        let other = channels[..k].iter().find(|other| plain(&other.name) == plain(&channel.name))?;
+        Some((channel.column.clone(), other.column.clone()))
+    };
+    match channels.iter().enumerate().find_map(other) {
+        Some((column, other)) => Err(CliError::Input(format!(
+            "{}: column `{column}`: expected a name of its own, found another column `{other}`",
+            table.header_name()
+        ))),
+        None => Ok(()),
+    }
 }
 
 /// Replaces characters that names of joints may not have.

@@ -52,7 +52,7 @@ impl HandParser {
         if text.is_empty() || text.starts_with('#') {
             return Ok(self.rows(line, joints));
         }
-        let names = cells(text).unwrap_or_default();
+        let names = cells(text).unwrap_or_else(|| vec![text.to_owned()]);
         let has_time = names.iter().any(|name| name == "time_s" || name == "time_us");
         let is_first = !self.has_header;
         if !is_first && !(self.is_stream && has_time) {
