@@ -87,6 +87,8 @@ pub struct Exported {
     words: String,
     /// True if it is reduced against the filter on a computer.
     is_smaller: bool,
+    /// Flag of `serial-check` for an estimator that is not the default.
+    check_flag: String,
     /// Promises and scores, line by line.
     promise: Vec<String>,
     cost: Cost,
@@ -165,6 +167,11 @@ impl Exported {
             with_sizes!(params.law.branches.len(), B, N, L => Self::of::<B, N, L>(params, &filter, made_by, dt_s));
         let mut exported = of_size.unwrap_or_else(|| Err(too_many_branches()))?;
         exported.promise = promise.to_vec();
+        exported.check_flag = match plan {
+            Plan { rows: Some(_), .. } | Plan { hypotheses: Some(_), .. } => " --budget BUDGET".to_owned(),
+            Plan { kind: Some(kind), .. } => format!(" --estimator {}", kind.name()),
+            Plan { kind: None, .. } => String::new(),
+        };
         Ok(exported)
     }
 
@@ -242,6 +249,7 @@ impl Exported {
             fields: around.fields(),
             words: chip.words(),
             is_smaller: chip.is_smaller(),
+            check_flag: String::new(),
             promise: Vec::new(),
             cost: Cost::of(&params.law, chip, vectors.work),
             law: LawConstants::new(model.law()),
