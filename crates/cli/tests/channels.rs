@@ -136,6 +136,15 @@ fn a_fused_joint_is_exported() {
     bench.write("twice.toml", format!("{text}\n[[joints]]{}", joint.replace("name = \"knee\"", "name = \"Knee\"")));
     let run = bench.run(&["export", "--sensor", "twice.toml", "--target", "c", "-o", "out3", "--dt-s", "0.1"]);
     assert!(run.stderr.contains("a name each in C, found two of the name `knee`"), "{}", run.stderr);
+    // Without the steps of the converter, a sensor at rest would count as stuck.
+    let sketch = bench.read("out/examples/ohmstrain_plotter/ohmstrain_plotter.ino");
+    assert!(sketch.contains("reading, reading_sd);") && sketch.contains("scale * sd_of(k, ohm)"), "{sketch}");
+    let current = "front_end = \"constant-current current_a=1e-4 gain=1 full_scale_v=1.2 bits=12 noise_codes=0.5\"\n";
+    bench
+        .write("current.toml", text.replace("column = \"inner_ohm\"\n", &format!("column = \"inner_ohm\"\n{current}")));
+    let run = bench.run(&["export", "--sensor", "current.toml", "--target", "c", "-o", "out4", "--dt-s", "0.1"]);
+    let says = "current.toml: column `inner_ohm`: expected a divider, which the exported sketch measures, found `constant-current ";
+    assert!(run.code == Some(4) && run.stderr.contains(says), "{}", run.stderr);
     for (flags, refused) in [
         (["--estimator", "ekf"], "--estimator is for one sensor"),
         (["--budget", "lean"], "--budget is for one sensor"),
@@ -172,6 +181,7 @@ fn errors_in_several_channels_are_reported() {
     let bench = bench();
     bench.write("bare.csv", bench.read("knee.csv").replace(",strain\n", ",x\n"));
     bench.write("other.csv", bench.read("knee.csv").replace("outer_ohm", "thigh_ohm"));
+    bench.write("double.csv", bench.read("knee.csv").replace("middle_ohm", "inner_ohm"));
     bench.write("word.csv", bench.read("knee.csv").replacen("\n0.0,", "\n0.0,x", 1));
     bench.write("mine.toml", "format = 1\n[[joints]]\nname = \"a\"\ncolumn = \"a_ohm\"\nsensor = \"a.toml\"\n");
     bench.write("unfused.toml", bench.read("knee.toml").replace("fusion = \"knee-fusion.toml\"\n", ""));
@@ -187,6 +197,11 @@ fn errors_in_several_channels_are_reported() {
             &["calibrate", "knee.csv", "other.csv", "-o", "out.toml"],
             4,
             "other.csv:2: expected the channels of the first recording",
+        ),
+        (
+            &["calibrate", "double.csv", "-o", "out.toml"],
+            4,
+            "double.csv:2: column `inner_ohm`: expected a name of its own, found another column `inner_ohm`",
         ),
         (&["calibrate", "word.csv", "-o", "out.toml"], 4, "word.csv:3: column `inner_ohm`"),
         (&["calibrate", "knee.csv", "-o", "out.toml", "--explain"], 2, "--explain is for recordings of one channel"),

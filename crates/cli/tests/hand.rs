@@ -316,11 +316,34 @@ fn filters_of_all_joints_restart_with_the_clock() {
     let hand = ["hand", "hand.toml", "--skip-bad"];
     let alone = |rows: &str| bench.feed(&hand, format!("{header}{rows}")).ok();
     // Two rows show that the clock has restarted; the third is the first that counts.
-    for (between, rest) in [("", rows(2)), (header, rows(0))] {
-        let run = bench.feed(&hand, format!("{header}{}{between}{}", rows(0), rows(0)));
+    let plain = rows(0);
+    let swapped = plain.lines().map(|row| {
+        let cells: Vec<&str> = row.split(',').collect();
+        format!("{},{},{}\n", cells[0], cells[2], cells[1])
+    });
+    let swapped: String = swapped.collect();
+    for (between, again, rest) in
+        [("", rows(0), rows(2)), (header, rows(0), rows(0)), ("time_s,b,a\n", swapped, rows(0))]
+    {
+        let run = bench.feed(&hand, format!("{header}{}{between}{again}", rows(0)));
         assert!(run.warnings.concat().contains("the clock has started again"), "{:?}", run.warnings);
         let second: Vec<String> = alone(&rest).lines().skip(1).map(|row| format!("{row}\n")).collect();
         assert_eq!(run.ok(), alone(&rows(0)) + &second.concat());
+    }
+    // A corrupt line is one line: it leaves the clock of the other channel as it was.
+    let corrupt = format!("{header}0,1700,1800\n9999,1700,x\n{}", rows(1));
+    let run = bench.feed(&hand, corrupt.clone());
+    assert!(!run.warnings.concat().contains("the clock has started again"), "{:?}", run.warnings);
+    assert_eq!(Csv::new(&run.ok()).len(), 50);
+    let quoted = format!("\u{feff}\"time_s\",\"a\",b\n{}", rows(0));
+    assert_eq!(bench.feed(&hand, quoted).ok(), alone(&rows(0)));
+    for (text, message) in [
+        (corrupt, "ohmstrain: odd.csv:3: column `b`: expected "),
+        ("time_s,a,b\n-1e308,1700,1800\n1e308,1700,1800\n".to_owned(), "ohmstrain: odd.csv:3: "),
+    ] {
+        bench.write("odd.csv", text);
+        let run = bench.run(&["hand", "hand.toml", "odd.csv"]);
+        assert!(run.code == Some(4) && run.stderr.contains(message), "{}", run.stderr);
     }
     let strict = bench.feed(&hand[..2], format!("{header}{}{}", rows(0), rows(0)));
     assert!(strict.code == Some(4) && strict.stderr.contains("--skip-bad goes on"), "{}", strict.stderr);

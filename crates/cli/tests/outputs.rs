@@ -120,6 +120,14 @@ fn an_input_or_another_output_is_not_replaced_whatever_it_is_called() {
     }
     let message = "cannot write ./sensor.toml: it is the input sensor.toml; choose another name\n";
     refused(&bench, &[&REFINE[..], &["./sensor.toml"]].concat(), ARGUMENTS, message);
+    bench.run(&["filter", "trace.csv", "--sensor", "sensor.toml", "--save-state", "state.toml"]).ok();
+    bench.run(&["plan", "--strains", "rest=0 full=0.2", "-o", "protocol.toml"]).ok();
+    let resumed = ["filter", "-", "--sensor", "sensor.toml", "--resume", "state.toml", "-o", "state.toml", "--force"];
+    let message = "cannot write state.toml: it is the input state.toml; choose another name\n";
+    refused(&bench, &resumed, ARGUMENTS, message);
+    let followed = ["simulate", "--follow", "protocol.toml", "-o", "protocol.toml", "--force"];
+    let message = "cannot write protocol.toml: it is the input protocol.toml; choose another name\n";
+    refused(&bench, &followed, ARGUMENTS, message);
     let message = "cannot write folder/../new.toml: it is the output new.toml; choose another name\n";
     refused(&bench, &[&CALIBRATE[..], &["new.toml", "--report", "folder/../new.toml"]].concat(), ARGUMENTS, message);
 }

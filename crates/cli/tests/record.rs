@@ -174,6 +174,12 @@ fn a_recording_is_never_replaced_unasked() {
     let run = record(&bench, "board.csv", &[]);
     assert!(run.code == Some(2) && run.stderr.contains("trace.csv is there already"), "{}", run.stderr);
     assert_eq!(bench.read("trace.csv"), "precious\n");
+    // An input never, not even with --force.
+    for (input, before) in [("board.csv", bench.read("board.csv")), ("protocol.toml", bench.read("protocol.toml"))] {
+        let run = record(&bench, "board.csv", &["--force", "-o", input]);
+        assert!(run.code == Some(2) && run.stderr.contains("it is the input"), "{}", run.stderr);
+        assert_eq!(bench.read(input), before);
+    }
     assert_eq!(record(&bench, "board.csv", &["--force"]).code, Some(0));
 }
 
@@ -200,6 +206,146 @@ fn readings_that_end_early_are_kept() {
     assert!(run.code == Some(4) && run.stderr.contains("no reading came"), "{}", run.stderr);
     let run = record(&bench, "board.csv", &["--force", "--header", "time_s,resistance_ohm"]);
     assert!(run.code == Some(0) && run.stderr.contains("2 rows, held at rest × 1"), "{}", run.stderr);
+}
+
+/// Records a stream, and returns the run and the recording.
+fn recorded(stream: &str, more: &[&str]) -> (crate::common::Run, String) {
+    let bench = planned();
+    bench.write("board.csv", stream);
+    let run = record(&bench, "board.csv", more);
+    (run, bench.read("trace.csv"))
+}
+
+#[test]
+fn rows_are_in_the_unit_of_their_heading_and_cells_stay_whole() {
+    let rows = "time_s,resistance_ohm,note,x\n0,1.6,\"a, b\",1\n0.1,,c,2\n";
+    for (above, flags) in [("", &["--unit", "resistance=kohm"][..]), ("# resistance_unit = kohm\n", &[])] {
+        let (_, text) = recorded(&format!("{above}{rows}"), flags);
+        let first = "# resistance_unit = ohm\ntime_s,resistance_ohm,note,x,strain,strain_sd\n0,1600,\"a, b\",1,";
+        assert!(text.contains(first) && text.contains("\n0.1,,c,2,"), "{text}");
+    }
+}
+
+#[test]
+fn columns_may_have_another_order_after_a_restart() {
+    let divider = |ohm: u32| format!("# front_end = divider reference_ohm={ohm} side=low bits=10 noise_codes=0.5\n");
+    let first = "time_s,resistance_ohm,x\n0,1600,9\n0.1,1601,9\n";
+    let (_, text) = recorded(&format!("{first}time_s,x,resistance_ohm\n0,8,1700\n0.1,8,1701\n"), &[]);
+    let trace = Csv::new(&text);
+    assert_eq!(trace.cells("resistance_ohm"), ["1600", "1601", "1700", "1701"]);
+    assert_eq!(trace.cells("x"), ["9", "9", "8", "8"]);
+    let codes = "time_s,adc\n0,500\n0.1,501\n";
+    for (stream, message) in [
+        (
+            format!("{first}time_s,resistance_ratio,x\n0,1,9\n"),
+            "board.csv: expected the column `resistance_ohm` as before",
+        ),
+        (
+            format!("{}{codes}{}{codes}", divider(1000), divider(2000)),
+            "board.csv: expected front_end `divider reference_ohm=1000 ",
+        ),
+    ] {
+        let (run, text) = recorded(&stream, &[]);
+        assert!(run.code == Some(4) && run.stderr.contains(message), "{}", run.stderr);
+        assert_eq!(Csv::new(&text).len(), 2);
+    }
+    // The electronics stay if nothing but a remark stands above the header.
+    let (run, text) = recorded(&format!("{}{codes}# warm now\n{codes}", divider(1000)), &[]);
+    assert!(run.code == Some(0) && Csv::new(&text).cells("adc") == ["500", "501", "500", "501"], "{}", run.stderr);
+}
+
+#[test]
+fn a_corrupt_line_of_several_channels_is_no_restart() {
+    let (run, text) = recorded("time_s,a_ohm,b_ohm\n0,1600,1700\n9999,1600,x\n0.1,1601,1701\n0.2,1601,1701\n", &[]);
+    assert!(run.stderr.contains("1 line skipped, 0 restarts"), "{}", run.stderr);
+    assert_eq!(Csv::new(&text).cells("time_s"), ["0", "0.1", "0.2"]);
+}
+
+#[cfg(unix)]
+mod of_ports {
+    use super::{Csv, record};
+    use crate::common::Bench;
+    use assert_cmd::cargo::cargo_bin;
+    use std::process::{Command, Stdio};
+
+    /// Returns a folder with a protocol of 3 s, and rows of 4 s.
+    fn short() -> (Bench, Vec<String>) {
+        let bench = Bench::new();
+        let text = "format = 1\n[[positions]]\nname = \"rest\"\nstrain = 0\n[[positions]]\nname = \"B\"\nstrain = 0.2\n\
+             [[steps]]\nto = \"rest\"\nhold_s = 1\n[[steps]]\nto = \"B\"\nmove_s = 1\nhold_s = 1\n";
+        bench.write("protocol.toml", text);
+        (bench, (0..40).map(|row| format!("{}.{},1600\n", row / 10, row % 10)).collect())
+    }
+
+    fn command(bench: &Bench, port: &str) -> Command {
+        let mut command = Command::new(cargo_bin!("ohmstrain"));
+        command.current_dir(bench.path("")).args(["record", "--port", port, "--protocol", "protocol.toml"]);
+        command.args(["-o", "trace.csv"]).stdout(Stdio::null()).stderr(Stdio::piped());
+        command
+    }
+
+    #[test]
+    fn a_pipe_may_be_closed_before_the_protocol_ends() {
+        let (bench, rows) = short();
+        let pipe = bench.path("pipe");
+        assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        let child = command(&bench, "pipe").spawn().unwrap();
+        std::fs::write(&pipe, format!("time_s,resistance_ohm\n{}", rows[..15].concat())).unwrap();
+        // The first writer has gone when the next one comes.
+        std::thread::sleep(std::time::Duration::from_millis(600));
+        std::fs::write(&pipe, rows[15..].concat()).unwrap();
+        let output = child.wait_with_output().unwrap();
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success() && stderr.contains("held at rest × 1, B × 1"), "{stderr}");
+        assert_eq!(Csv::new(&bench.read("trace.csv")).cells("time_s")[14..16], ["1.4", "1.5"]);
+    }
+
+    #[test]
+    fn a_source_that_cannot_be_read_is_an_error() {
+        let (bench, _) = short();
+        let folder = std::fs::File::open(bench.path("")).unwrap();
+        let output = command(&bench, "-").stdin(folder).output().unwrap();
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.code() == Some(1) && stderr.contains("cannot read -: "), "{stderr}");
+    }
+
+    #[test]
+    fn a_full_disk_leaves_whole_rows() {
+        let (bench, rows) = short();
+        let times = rows.iter().enumerate().map(|(row, _)| format!("{row},1600.123456789\n"));
+        bench.write("board.csv", "time_s,resistance_ohm\n".to_owned() + &times.collect::<String>());
+        bench.write(
+            "protocol.toml",
+            bench.read("protocol.toml").replace("hold_s = 1\n[[steps]]", "hold_s = 100\n[[steps]]"),
+        );
+        let limited = "trap '' XFSZ; ulimit -f 1; exec \"$0\" record --port board.csv --speed 1000 --protocol protocol.toml -o trace.csv";
+        let mut shell = Command::new("sh");
+        let output =
+            shell.args(["-c", limited]).arg(cargo_bin!("ohmstrain")).current_dir(bench.path("")).output().unwrap();
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        let text = bench.read("trace.csv");
+        if text.len() < 500 || output.status.success() {
+            return; // The shell has no such limit.
+        }
+        assert!(output.status.code() == Some(1) && stderr.contains("cannot write trace.csv: "), "{stderr}");
+        assert!(text.ends_with('\n') && text.lines().last().unwrap().contains(",1600.123456789,"), "{text}");
+    }
+
+    #[test]
+    fn the_first_step_that_is_spoiled_is_announced_again() {
+        let (bench, _) = short();
+        bench.write("board.csv", "time_s,resistance_ohm\n0,1600\n0.1,1600\n0.2,1600\n9,1600\n9.1,1600\n");
+        bench.write(
+            "protocol.toml",
+            bench.read("protocol.toml").replace("hold_s = 1\n[[steps]]", "hold_s = 100\n[[steps]]"),
+        );
+        let run = record(&bench, "board.csv", &[]);
+        assert!(
+            run.stdout.matches("hold rest for 100 s").count() == 2 && !run.stdout.contains("done"),
+            "{}",
+            run.stdout
+        );
+    }
 }
 
 #[cfg(unix)]

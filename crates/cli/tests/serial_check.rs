@@ -127,3 +127,17 @@ fn what_the_recorder_prints_is_a_trace() {
     assert_eq!(bench.run(&["import", "recorded.csv", "-o", "imported.csv"]).code, Some(0));
     assert!(bench.read("imported.csv").contains("side=low"));
 }
+
+/// The command in the exported README is one that works.
+#[test]
+fn the_exported_command_names_the_estimator() {
+    let bench = Bench::calibrated();
+    for (flags, command) in [
+        (&[][..], "serial-check --sensor sensor.toml --dt-s "),
+        (&["--estimator", "sign-split"], "serial-check --sensor sensor.toml --estimator sign-split --dt-s "),
+    ] {
+        let export = ["export", "--sensor", "sensor.toml", "--dt-s", DT_S, "--target", "c", "-o", "c", "--force"];
+        bench.run(&[&export[..], flags].concat()).ok();
+        assert!(bench.read("c/README.md").contains(command), "{}", bench.read("c/README.md"));
+    }
+}

@@ -103,17 +103,21 @@ fn a_closed_pipe_ends_quietly() {
     let bench = Bench::calibrated();
     // More output than any pipe holds.
     bench.run(&["simulate", "--protocol", "mixed", "--sample-rate-hz", "50", "-o", "long.csv"]).ok();
-    let commands: [&[&str]; 4] = [
+    let commands: [&[&str]; 6] = [
         &["simulate", "--protocol", "mixed", "--sample-rate-hz", "50"],
         &["filter", "long.csv", "--sensor", "sensor.toml"],
         &["smooth", "long.csv", "--sensor", "sensor.toml"],
         &["evaluate", "long.csv", "--sensor", "sensor.toml", "--json"],
+        &["filter", "long.csv", "--sensor", "sensor.toml", "--save-state", "state.toml"],
+        &["export", "--sensor", "sensor.toml", "--target", "c", "-o", "c"],
     ];
     for arguments in commands {
         let mut child = start(&bench, arguments);
         drop(child.stdout.take());
         finish(arguments, child).ok();
     }
+    // Files are written even if nobody reads what is printed.
+    assert!(bench.read("state.toml").contains("format = ") && bench.path("c/src/ohmstrain.c").exists());
 }
 
 #[test]
