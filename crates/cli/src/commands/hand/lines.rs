@@ -55,7 +55,7 @@ impl HandParser {
         let names = cells(text).unwrap_or_else(|| vec![text.to_owned()]);
         let has_time = names.iter().any(|name| name == "time_s" || name == "time_us");
         let is_first = !self.has_header;
-        if !is_first && !(self.is_stream && has_time) {
+        if !(is_first || self.is_stream && has_time) {
             return Ok(self.rows(line, joints));
         }
         let headers: Result<Vec<String>, String> = channels(joints).map(|channel| channel.header(&names)).collect();
