@@ -76,7 +76,7 @@ pub enum PacingError {
     /// Two positions or two joints of one name.
     #[error("expected each {what} once, found `{name}` twice")]
     Twice {
-        /// What they are.
+        /// Kind of thing: position or joint.
         what: &'static str,
         /// Their name.
         name: String,

@@ -176,7 +176,8 @@ fn a_recording_is_never_replaced_unasked() {
     assert_eq!(bench.read("trace.csv"), "precious\n");
     // An input never, not even with --force.
     for (input, before) in [("board.csv", bench.read("board.csv")), ("protocol.toml", bench.read("protocol.toml"))] {
-        let run = record(&bench, "board.csv", &["--force", "-o", input]);
+        let flags = ["record", "--port", "board.csv", "--protocol", "protocol.toml", "--force", "-o", input];
+        let run = bench.run(&flags);
         assert!(run.code == Some(2) && run.stderr.contains("it is the input"), "{}", run.stderr);
         assert_eq!(bench.read(input), before);
     }

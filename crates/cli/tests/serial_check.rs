@@ -134,7 +134,7 @@ fn the_exported_command_names_the_estimator() {
     let bench = Bench::calibrated();
     for (flags, command) in [
         (&[][..], "serial-check --sensor sensor.toml --dt-s "),
-        (&["--estimator", "sign-split"], "serial-check --sensor sensor.toml --estimator sign-split --dt-s "),
+        (&["--estimator", "static-cubic"], "serial-check --sensor sensor.toml --estimator static-cubic --dt-s "),
     ] {
         let export = ["export", "--sensor", "sensor.toml", "--dt-s", DT_S, "--target", "c", "-o", "c", "--force"];
         bench.run(&[&export[..], flags].concat()).ok();

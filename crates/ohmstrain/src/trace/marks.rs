@@ -166,7 +166,7 @@ mod tests {
         assert_eq!(found, [rest, moment]);
     }
 
-    /// As a column `strain` or `angle_deg`: 5 ± 1 %, and 90 ± 1.8° around an axis 10 mm away, of a sensor of 50 mm.
+    /// Tests conversions as of columns `strain` and `angle_deg`: 5 ± 1 %, and 90 ± 1.8° around an axis 10 mm away, of a sensor of 50 mm.
     #[test]
     fn marks_are_converted_as_a_reference_is() {
         let converted = |quantity, (value, sd), joint: Option<&str>, unit| {

@@ -197,8 +197,8 @@ fn segments_say_what_the_whole_recording_says() {
             // At readings the filter's variance is 1e-4, whatever the side.
             expected.variance += bare_row.estimate.strain.variance - 1e-4;
         }
-        // The last four rows have no reading. Time constant and least weight are those of `last_rows.rs`.
-        let weight = (-(time_s[time_s.len() - 5] - time_s[k]).max(0.0) / 4.0).exp();
+        // The last three rows have no reading. Time constant and least weight are those of `last_rows.rs`.
+        let weight = (-(time_s[time_s.len() - 4] - time_s[k]).max(0.0) / 4.0).exp();
         let is_last = weight >= 0.01;
         if is_last {
             let Gaussian { mean, variance } = filtered(time_s[k]);
@@ -208,9 +208,8 @@ fn segments_say_what_the_whole_recording_says() {
             expected = Gaussian { mean, variance: second - mean * mean };
         }
         let strain = smoothed[k].estimate.strain;
-        // The low-passes restart after thousands of rows from the stored state: equal to the last bit, except for the
-        // growth.
-        // The mean of a mixture is rounded otherwise, once or twice.
+        // The low-passes restart after thousands of rows from the stored state: equal to the last bit, except for the growth,
+        // and for the mean of a mixture, which is rounded otherwise.
         let rounding = if is_last { 2.0 * f64::EPSILON } else { 0.0 };
         assert!((strain.mean - expected.mean).abs() <= rounding, "{k}");
         assert!((strain.variance - expected.variance).abs() < 1e-15, "{k}");
