@@ -27,26 +27,16 @@ fn an_object_for_each_row() {
 /// A JSON number of 17 digits is the same number as in a CSV.
 #[test]
 fn numbers_are_rounded_once() {
-    let text = file("", |ms, _, strain| {
-        format!(
-            "{{\"time_s\": {}, \"resistance_ohm\": 1600.2220009926900355, \"strain\": {}}}",
-            decimal(ms, 3, '.'),
-            decimal(strain, 4, '.')
-        )
-    });
-    let (_, imported) = proposed(&[("a.jsonl", text.into_bytes())], &Recipe::default()).unwrap();
-    let text = file("", |ms, _, strain| {
-        format!(
-            "{{\"time_s\": {}, \"resistance_ohm\": 0.22200099269003554, \"strain\": {}}}",
-            decimal(ms, 3, '.'),
-            decimal(strain, 4, '.')
-        )
-    });
-    let (_, other) = proposed(&[("a.jsonl", text.into_bytes())], &Recipe::default()).unwrap();
-    assert_eq!(
-        (imported.trace.readings.values[0], other.trace.readings.values[0]),
-        (1_600.222_000_992_69, 0.222_000_992_690_035_54)
-    );
+    for (text, expected) in
+        [("1600.2220009926900355", 1_600.222_000_992_69), ("0.22200099269003554", 0.222_000_992_690_035_54)]
+    {
+        let object = |ms, _, strain| {
+            let (time_s, strain) = (decimal(ms, 3, '.'), decimal(strain, 4, '.'));
+            format!("{{\"time_s\": {time_s}, \"resistance_ohm\": {text}, \"strain\": {strain}}}")
+        };
+        let (_, imported) = proposed(&[("a.jsonl", file("", object).into_bytes())], &Recipe::default()).unwrap();
+        assert_eq!(imported.trace.readings.values[0], expected);
+    }
 }
 
 #[test]
